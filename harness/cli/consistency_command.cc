@@ -35,7 +35,7 @@ std::string MakePage(const ConsistencyRequest& request, const Comparison& compar
   const DescriptionFile second(request.files.mjcf, request.urdf);
   nlohmann::ordered_json result = ToJson(request, comparison, code);
   for (size_t i = 0; i < result["causes"].size(); ++i) {
-    for (const Site& site : comparison.causes->corrections.items[i].sites)
+    for (const Site& site : comparison.causes->items[i].sites)
       result["causes"][i]["sites"].push_back(NameSite(site.kind));
   }
   return MakeFilesPage(ReadPrintedRobot(first, &second), ReadPrintedRobot(second, &first), result);

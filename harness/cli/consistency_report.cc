@@ -104,7 +104,7 @@ std::string DescribeLoosest(const LoosestNumber& loosest) {
   return fmt::format("; loosest: {}, compared to {:.2g} %", loosest.what, 100.0 * loosest.fraction);
 }
 
-Json ToJson(const FileCause& cause) {
+Json ToJson(const CorrectionItem& cause) {
   Json json = {{"text", cause.text},           {"id", cause.id},
                {"places", cause.places},       {"changes", Json::array()},
                {"explained", cause.explained}, {"alternatives", Json::array()}};
@@ -115,7 +115,7 @@ Json ToJson(const FileCause& cause) {
     entry["value"] = show(change.value);
     entry["repair"] = show(change.repair);
   }
-  for (const FileCause& other : cause.alternatives) json["alternatives"].push_back(ToJson(other));
+  for (const CorrectionItem& other : cause.rivals) json["alternatives"].push_back(ToJson(other));
   return json;
 }
 
@@ -125,10 +125,10 @@ Answer AnswerByCauses(const ConsistencyRequest& request, const Comparison& compa
                       const std::string& left) {
   const FileCauses& causes = *comparison.causes;
   Answer answer{Answer::Tone::kBad, "DISAGREE", causes.file + " differs from " + causes.reference + "."};
-  for (const FileCause& cause : causes.causes) {
+  for (const CorrectionItem& cause : causes.items) {
     std::string& text =
         answer.causes.emplace_back(fmt::format("{}; explains {:.3g} %", cause.text, 100.0 * cause.explained));
-    for (const FileCause& other : cause.alternatives) text += "\n     or, just as well: " + other.text;
+    for (const CorrectionItem& other : cause.rivals) text += "\n     or, just as well: " + other.text;
   }
   std::vector<std::string> unexplained = causes.unexplained;
   for (const std::string& line : ListOtherDifferences(comparison)) unexplained.push_back(line);
@@ -239,7 +239,7 @@ void AddCauses(const Comparison& comparison, Json* json) {
   if (comparison.Agrees()) return;
   const bool has_causes = comparison.causes && !comparison.causes->agrees;
   if (has_causes) {
-    for (const FileCause& cause : comparison.causes->causes) (*json)["causes"].push_back(ToJson(cause));
+    for (const CorrectionItem& cause : comparison.causes->items) (*json)["causes"].push_back(ToJson(cause));
     (*json)["unexplained"] = comparison.causes->unexplained;
   }
   for (const std::string& line : has_causes ? ListOtherDifferences(comparison) : ListDifferences(comparison))
@@ -384,7 +384,7 @@ std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comp
     if (!has_case) cases.push_back({"constant", finding.check, finding.where, ""});
   }
   if (comparison.causes) {
-    for (const FileCause& cause : comparison.causes->causes)
+    for (const CorrectionItem& cause : comparison.causes->items)
       cases.push_back({"cause", cause.id, cause.text, ""});
   }
   return WriteJUnit("dexcheck.consistency." + comparison.first.stem().string(), cases, result.seconds,

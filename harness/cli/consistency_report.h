@@ -8,7 +8,7 @@
 
 #include "harness/base/answer.h"
 #include "harness/cli/commands.h"
-#include "harness/comparison/results_comparison.h"
+#include "harness/comparison/file_comparison.h"
 
 namespace dexcheck::cli {
 

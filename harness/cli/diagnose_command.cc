@@ -38,7 +38,7 @@ std::string WriteRepair(const DiagnoseRequest& request, const DescriptionFile& f
   const std::string a = first.path().filename().string();
   const std::string b = second->path().filename().string();
   if (comparison.Agrees()) return nothing + a + " agrees with " + b;
-  if (!comparison.causes || comparison.causes->causes.empty()) return nothing + "no cause is known";
+  if (!comparison.causes || comparison.causes->items.empty()) return nothing + "no cause is known";
   if (comparison.causes->of_second) {
     const std::string command = TryRepair(request, comparison).command;
     return nothing + "the cause is in " + b + (command.empty() ? "" : "; it is repaired by " + command);

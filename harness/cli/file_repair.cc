@@ -18,7 +18,7 @@ RepairedFile Repair(const ConsistencyRequest& request, const DescriptionFile& fi
 
 RepairTrial TryRepair(const ConsistencyRequest& request, const Comparison& comparison) {
   constexpr int kStates = 50;
-  if (!comparison.causes || comparison.causes->causes.empty()) return {};
+  if (!comparison.causes || comparison.causes->items.empty()) return {};
   const bool of_second = comparison.causes->of_second;
   const std::filesystem::path& path = of_second ? request.files.mjcf : request.files.robot;
   const std::filesystem::path& other = of_second ? request.files.robot : request.files.mjcf;

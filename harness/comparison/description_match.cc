@@ -10,8 +10,8 @@
 #include "controller/common/text.h"
 #include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/constant_table.h"
-#include "harness/descriptions/link_frame_tree.h"
 #include "harness/descriptions/mjcf_reader.h"
+#include "harness/descriptions/robot_description.h"
 #include "harness/engine/engine.h"
 
 namespace dexcheck {

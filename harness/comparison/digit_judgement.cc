@@ -12,9 +12,9 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/worst.h"
-#include "harness/comparison/body_comparison.h"
+#include "harness/comparison/constant_checks.h"
 #include "harness/comparison/description_match.h"
-#include "harness/descriptions/link_frame_tree.h"
+#include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {
 namespace {

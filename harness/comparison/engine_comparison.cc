@@ -15,7 +15,6 @@
 #include "harness/base/worst.h"
 #include "harness/comparison/description_match.h"
 #include "harness/comparison/engine_constants.h"
-#include "harness/comparison/engine_settings.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/engine_provider.h"
 #include "harness/descriptions/mjcf_reader.h"
@@ -24,6 +23,85 @@ namespace dexcheck {
 namespace {
 
 using ProviderPtr = std::unique_ptr<DynamicsProvider>;
+using Change = std::function<void(RobotDescription*)>;
+
+/// Returns what makes the bodies anew from their parts, each changed by `change(R, body)`: R turns the axes
+/// along which the file gives the inertia into the link's.
+template <typename ChangeBody>
+Change ChangeParts(const ChangeBody& change) {
+  return [change](RobotDescription* robot) {
+    for (DescribedPart& part : robot->parts) change(Matrix3d(part.X_LC.linear()), &part.body);
+    FuseParts(robot);
+  };
+}
+
+template <typename ChangeJoint>
+Change ChangeJoints(const ChangeJoint& change) {
+  return [change](RobotDescription* robot) {
+    for (Joint& joint : robot->spec.joints) change(&joint);
+  };
+}
+
+/// Euler's step with damping taken at its end has M + h D instead of M.
+Change AddImplicitDamping(double step) {
+  return ChangeJoints([step](Joint* joint) { joint->armature += step * joint->damping; });
+}
+
+void DropWeldedParts(RobotDescription* robot) {
+  std::vector<bool> seen(robot->spec.joints.size() + 1, false);
+  for (DescribedPart& part : robot->parts) {
+    const auto place = static_cast<size_t>(part.joint + 1);
+    if (seen[place]) part.body = {};
+    seen[place] = true;
+  }
+  FuseParts(robot);
+}
+
+Change SetGravity(double g) {
+  return [g](RobotDescription* robot) {
+    if (robot->spec.gravity.norm() > 0.0) robot->spec.gravity *= g / robot->spec.gravity.norm();
+  };
+}
+
+/// A way to read or treat the robot.
+struct Setting {
+  std::string text;
+  Change apply;
+};
+
+std::vector<Setting> ListSettings() {
+  return {
+      {"viscous damping of joints left out", ChangeJoints([](Joint* joint) { joint->damping = 0.0; })},
+      {"armature left out", ChangeJoints([](Joint* joint) { joint->armature = 0.0; })},
+      {"damping taken at the end of a step of 2 ms (M + h D)", AddImplicitDamping(0.002)},
+      {"damping taken at the end of a step of 1 ms (M + h D)", AddImplicitDamping(0.001)},
+      {"the rotations (rpy) of the inertials not read",
+       ChangeParts([](const Matrix3d& R, MassProperties* body) {
+         body->inertia = R.transpose() * body->inertia * R;
+       })},
+      {"products of inertia left out", ChangeParts([](const Matrix3d& R, MassProperties* body) {
+         const Matrix3d own = R.transpose() * body->inertia * R;
+         body->inertia = R * Matrix3d(own.diagonal().asDiagonal()) * R.transpose();
+       })},
+      {"inertias left out, masses kept",
+       ChangeParts([](const Matrix3d&, MassProperties* body) { body->inertia.setZero(); })},
+      {"inertias read as about the links' origins", ChangeParts([](const Matrix3d&, MassProperties* body) {
+         body->inertia -= CalcPointInertia(body->mass, body->com);
+       })},
+      {"the masses of links on fixed joints lost in fusing", DropWeldedParts},
+      {"no gravity", [](RobotDescription* robot) { robot->spec.gravity.setZero(); }},
+      {"gravity upwards", [](RobotDescription* robot) { robot->spec.gravity *= -1.0; }},
+      {"gravity of 9.800000 m/s^2", SetGravity(9.8)},
+      {"gravity of 9.806650 m/s^2", SetGravity(9.80665)},
+      {"gravity of 9.810000 m/s^2", SetGravity(9.81)},
+  };
+}
+
+/// Another description of the robot, which one engine may have read.
+struct OtherDescription {
+  std::string text;  ///< "as with what only robot.xml states".
+  RobotDescription robot;
+};
 
 class EngineComparisonRun {
  public:
@@ -252,6 +330,36 @@ class EngineComparisonRun {
                              [](const auto& a, const auto& b) { return a.size() > b.size(); });
   }
 
+  /// The setting under which the analytic model of the description has the terms of a provider that disagrees
+  /// with it: "as with no gravity"; nothing when no setting explains it.
+  std::optional<std::string> FindSetting(DynamicsProvider* provider) const {
+    const auto explains = [&](const RobotDescription& changed) {
+      try {
+        AnalyticProvider model(changed.spec, "");
+        return AgreeAtFirst(model_, &model, provider, MakeFeed(), options_.tolerance);
+      } catch (const InputError&) {
+        return false;  // no body is like that
+      }
+    };
+    for (const OtherDescription& other : others_) {
+      if (explains(other.robot)) return other.text;
+    }
+    // Alone first, then two at a time: an engine may leave out damping and misread inertials.
+    const std::vector<Setting> settings = ListSettings();
+    for (const bool alone : {true, false}) {
+      for (size_t i = 0; i < settings.size(); ++i) {
+        for (size_t j = alone ? i : i + 1; j < (alone ? i + 1 : settings.size()); ++j) {
+          RobotDescription changed = robot_;
+          settings[i].apply(&changed);
+          if (!alone) settings[j].apply(&changed);
+          if (explains(changed))
+            return "as with " + settings[i].text + (alone ? "" : ", and " + settings[j].text);
+        }
+      }
+    }
+    return std::nullopt;
+  }
+
   /// Why those outside of the largest group differ from the description's analytic model.
   void Explain() {
     const auto make_feed = [this] { return MakeFeed(); };
@@ -259,8 +367,7 @@ class EngineComparisonRun {
     for (const ProviderPtr& owned : providers_) {
       DynamicsProvider* const provider = owned.get();
       if (AgreeAtFirst(model_, &model, provider, make_feed(), options_.tolerance)) continue;
-      std::optional<std::string> setting =
-          FindSetting(robot_, provider, make_feed, options_.tolerance, others_);
+      std::optional<std::string> setting = FindSetting(provider);
       auto* const by_layout = dynamic_cast<LayoutProvider*>(provider);
       if (!setting && by_layout != nullptr && by_layout->layout().is_floating()) {
         const std::optional<BaseConvention> other = FindOtherConvention(model_, &model, by_layout, make_feed);

@@ -124,23 +124,6 @@ std::vector<FileChange> ListChanges(const PrintedRobot& robot, const CorrectionI
   return changes;
 }
 
-/// @param robot that the item's patches are of.
-/// @param name_file names the file that has the fault, where it is not the one that is to be corrected.
-FileCause MakeCause(const PrintedRobot& robot, CorrectionItem item,
-                    const std::function<std::string(const CorrectionItem&)>& name_file) {
-  FileCause cause;
-  const std::string file = name_file(item);
-  item.in_second = false;
-  cause.text = (file.empty() ? "" : "in " + file + ", ") + DescribeItem(item);
-  cause.id = item.id;
-  cause.places = item.places;
-  cause.changes = ListChanges(robot, item);
-  cause.explained = item.explained;
-  for (const CorrectionItem& rival : item.rivals)
-    cause.alternatives.push_back(MakeCause(robot, rival, name_file));
-  return cause;
-}
-
 }  // namespace
 
 void LeaveOutUnstated(const std::vector<std::string>& ignore, PrintedRobot* robot) {
@@ -223,50 +206,45 @@ bool IsExplained(const std::string& check, const CorrectionItem& cause) {
 
 FileCauses FindCauses(PrintedRobot a, PrintedRobot b) {
   LeaveOutUnshared(&a, &b);
-  FileCauses found;
-  found.corrections = FindCorrections(a, b);
-  const std::vector<CorrectionItem>& items = found.corrections.items;
-  const bool of_second = found.corrections.of_second;
-  const bool is_in_reference = !items.empty() && std::ranges::all_of(items, [&](const CorrectionItem& item) {
-    return item.in_second != of_second;
-  });
+  FileCauses found{FindCorrections(a, b), {}, {}};
+  const bool of_second = found.of_second;
+  const bool is_in_reference =
+      !found.items.empty() && std::ranges::all_of(found.items, [&](const CorrectionItem& item) {
+        return item.in_second != of_second;
+      });
   found.of_second = of_second != is_in_reference;
-  const PrintedRobot& corrected = found.of_second ? b : a;
-  const PrintedRobot& reference = found.of_second ? a : b;
-  found.agrees = found.corrections.agrees;
-  found.file = corrected.source;
-  found.reference = reference.source;
-  found.unexplained = found.corrections.unexplained;
-  const auto name_file = [&](const CorrectionItem& item) {
-    return item.in_second == found.of_second ? std::string() : reference.source;
+  found.file = (found.of_second ? b : a).source;
+  found.reference = (found.of_second ? a : b).source;
+  const auto describe = [&](CorrectionItem* item) {
+    item->text = DescribeItem(*item, item->in_second == found.of_second ? "" : found.reference);
+    item->changes = ListChanges(of_second ? b : a, *item);
   };
-  for (const CorrectionItem& item : items)
-    found.causes.push_back(MakeCause(of_second ? b : a, item, name_file));
+  for (CorrectionItem& item : found.items) {
+    describe(&item);
+    for (CorrectionItem& rival : item.rivals) describe(&rival);
+  }
   return found;
 }
 
 void LeaveOutWithin(double tolerance, const std::function<bool(SiteKind)>& differs, FileCauses* causes) {
-  for (size_t i = causes->causes.size(); i-- > 0;) {
-    const std::vector<FileChange>& changes = causes->causes[i].changes;
-    const bool is_within = !changes.empty() && std::ranges::all_of(changes, [&](const FileChange& change) {
-      return change.value && change.repair &&
-             std::abs(*change.value - *change.repair) <= tolerance * change.size;
-    });
-    const std::vector<Site>& sites = causes->corrections.items[i].sites;
-    const bool is_seen = std::ranges::any_of(sites, [&](const Site& site) { return differs(site.kind); });
-    if (!is_within && is_seen) continue;
-    causes->causes.erase(causes->causes.begin() + static_cast<std::ptrdiff_t>(i));
-    causes->corrections.items.erase(causes->corrections.items.begin() + static_cast<std::ptrdiff_t>(i));
-  }
-  causes->agrees = causes->causes.empty() && causes->unexplained.empty();
+  std::erase_if(causes->items, [&](const CorrectionItem& item) {
+    const bool is_within =
+        !item.changes.empty() && std::ranges::all_of(item.changes, [&](const FileChange& change) {
+          return change.value && change.repair &&
+                 std::abs(*change.value - *change.repair) <= tolerance * change.size;
+        });
+    return is_within ||
+           std::ranges::none_of(item.sites, [&](const Site& site) { return differs(site.kind); });
+  });
+  causes->agrees = causes->items.empty() && causes->unexplained.empty();
 }
 
 std::vector<std::string> ListLines(const FileCauses& causes) {
   std::vector<std::string> lines;
-  for (size_t i = 0; i < causes.causes.size(); ++i) {
-    const FileCause& cause = causes.causes[i];
+  for (size_t i = 0; i < causes.items.size(); ++i) {
+    const CorrectionItem& cause = causes.items[i];
     lines.push_back(fmt::format("{}. {}; explains {:.3g} %", i + 1, cause.text, 100.0 * cause.explained));
-    for (const FileCause& other : cause.alternatives) lines.push_back("   or, just as well: " + other.text);
+    for (const CorrectionItem& other : cause.rivals) lines.push_back("   or, just as well: " + other.text);
   }
   for (const std::string& left : causes.unexplained) lines.push_back("not explained: " + left);
   return lines;

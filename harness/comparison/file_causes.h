@@ -12,32 +12,10 @@
 
 namespace dexcheck {
 
-/// A number of a file, and its value with the cause corrected.
-struct FileChange {
-  std::string place, quantity, unit;
-  std::optional<double> value, repair;  ///< None where the file does not state it, or must not.
-  double size = 0.0;                    ///< Largest number of its vector or tensor.
-};
-
-/// One cause, at one place or several.
-struct FileCause {
-  std::string text;  ///< "link forearm: mass in g".
-  std::string id;    ///< "mass.g"
-  std::vector<std::string> places;
-  std::vector<FileChange> changes;
-  double explained = 0.0;               ///< Fraction of the quantities that differ which it puts right.
-  std::vector<FileCause> alternatives;  ///< Causes that explain the same, about as likely.
-};
-
-/// The causes by which two files differ.
-struct FileCauses {
-  bool agrees = true;
-  bool of_second = false;                ///< The second file is to be corrected.
-  std::string file;                      ///< Name of the file that is to be corrected,
-  std::string reference;                 ///< and of the other one.
-  std::vector<FileCause> causes;         ///< The one that explains most first.
-  std::vector<std::string> unexplained;  ///< "joint q1: position"
-  FileCorrections corrections;           ///< The causes as values, in the same order.
+/// The causes by which two files differ, the one that explains most first.
+struct FileCauses : FileCorrections {
+  std::string file;       ///< Name of the file that is to be corrected,
+  std::string reference;  ///< and of the other one.
 };
 
 /// Takes out of a robot the constants of joints that two files need not share (kIgnorable), and numbers that
@@ -52,7 +30,7 @@ void LeaveOutUnshared(PrintedRobot* a, PrintedRobot* b);
 /// Whether a constant or term that differs (ConstantFinding::check) follows from a cause.
 bool IsExplained(const std::string& check, const CorrectionItem& cause);
 inline bool IsExplained(const std::string& check, const FileCauses& causes) {
-  return std::ranges::any_of(causes.corrections.items,
+  return std::ranges::any_of(causes.items,
                              [&](const CorrectionItem& item) { return IsExplained(check, item); });
 }
 

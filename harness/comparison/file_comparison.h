@@ -10,6 +10,8 @@
 #include "harness/comparison/consistency.h"
 #include "harness/comparison/digit_judgement.h"
 #include "harness/comparison/file_causes.h"
+#include "harness/descriptions/program_provider.h"
+#include "harness/descriptions/term_results.h"
 #include "harness/descriptions/urdf_reader.h"
 
 namespace dexcheck {
@@ -53,5 +55,24 @@ Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOption
 /// Otherwise it is four times the worst error found, rounded up to one digit, since a run visits other
 /// states.
 double CalcTolerance(const ConsistencyResult& result);
+
+// A description compared with terms of somebody else's: a program, results in files, or functions.
+
+/// Results to compare with a description: a program's command, or a folder with result files.
+struct ResultsSource {
+  std::string program;
+  std::filesystem::path results;
+  ProgramOptions program_options;
+};
+
+/// Compares a description with the results of a program, run now or in files; the terms of an MJCF are the
+/// engine's. Other conventions are tried for a floating base whose terms disagree.
+Comparison CompareResults(const std::filesystem::path& file, const ResultsSource& source,
+                          const UrdfOptions& urdf, const ConsistencyOptions& options,
+                          const Progress& progress);
+
+/// Compares functions with a parameter file, a URDF, or an MJCF, whose terms are the engine's.
+Comparison CompareFunctions(const std::filesystem::path& file, const TermFunctions& functions,
+                            const UrdfOptions& urdf, const ConsistencyOptions& options);
 
 }  // namespace dexcheck

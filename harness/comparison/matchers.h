@@ -16,8 +16,8 @@
 #include <string>
 
 #include "harness/comparison/consistency.h"
+#include "harness/comparison/file_comparison.h"
 #include "harness/comparison/file_differences.h"
-#include "harness/comparison/results_comparison.h"
 
 namespace dexcheck::testing {
 

@@ -351,12 +351,15 @@ class OneWay {
 
   void AddRivals(const ChosenDeal& chosen, const std::vector<Site>& sites,
                  const std::vector<CorrectionCandidate>& candidates, CorrectionItem* item) const {
-    std::vector<std::string> texts = {DescribeItem(*item)};
+    const auto describe = [](const CorrectionItem& one) {
+      return DescribeItem(one, one.in_second ? "the second file" : "");
+    };
+    std::vector<std::string> texts = {describe(*item)};
     for (const Deal& deal : chosen.rivals) {
       CorrectionItem rival = MakeItems(deal, sites, candidates)[0];
       if (deal.candidates.size() < chosen.deal.candidates.size() && IsSameFault(rival.fault, item->fault))
         continue;
-      std::string text = DescribeItem(rival);
+      std::string text = describe(rival);
       if (std::ranges::find(texts, text) != texts.end()) continue;
       texts.push_back(std::move(text));
       item->rivals.push_back(std::move(rival));
@@ -458,11 +461,11 @@ FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile&
   return FindCorrections(ReadPrintedRobot(a, &b), ReadPrintedRobot(b, &a), options);
 }
 
-std::string DescribeItem(const CorrectionItem& item) {
+std::string DescribeItem(const CorrectionItem& item, const std::string& file) {
   FileFault fault = item.fault;
   fault.in_second = false;
-  std::string text = fmt::format("{}{}: {}", item.in_second ? "in the second file, " : "",
-                                 JoinNames(item.places), DescribeFault(fault));
+  std::string text = fmt::format("{}{}: {}", file.empty() ? "" : "in " + file + ", ", JoinNames(item.places),
+                                 DescribeFault(fault));
   // Values of a few places; one where they are the same at all.
   constexpr size_t kShown = 3;
   std::vector<std::string> values;

@@ -2,6 +2,7 @@
 
 // Why two files of one robot differ: the cheapest list of corrections of one of them.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,13 @@
 #include "harness/descriptions/read_description.h"
 
 namespace dexcheck {
+
+/// A number of a file, and its value with the fault corrected.
+struct FileChange {
+  std::string place, quantity, unit;
+  std::optional<double> value, repair;  ///< None where the file does not state it, or must not.
+  double size = 0.0;                    ///< Largest number of its vector or tensor.
+};
 
 /// A fault at one place or several, and what would explain the same as well.
 struct CorrectionItem {
@@ -23,6 +31,8 @@ struct CorrectionItem {
   std::vector<LinkPatch> patches;  ///< Links with it undone.
   double bits = 0.0;
   std::vector<CorrectionItem> rivals;  ///< Within a factor of ten of its probability.
+  std::string text;                    ///< "link forearm: mass in g"; with the changes set by FindCauses.
+  std::vector<FileChange> changes;
 };
 
 struct FileCorrections {
@@ -45,7 +55,8 @@ FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b,
 FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b,
                                 const CorrectionOptions& options = {});
 
-/// One line: "joints q1, q2: rotation with its angles in degrees".
-std::string DescribeItem(const CorrectionItem& item);
+/// One line: "joints q1, q2: rotation with its angles in degrees". @param file that has the fault; may be
+/// empty.
+std::string DescribeItem(const CorrectionItem& item, const std::string& file = "");
 
 }  // namespace dexcheck

@@ -137,8 +137,7 @@ PrintedOrigin PrintPose(const Pose& X) {
 PrintedOrigin PrintRow(const Joint& joint, const WrittenRow& row, const Pose& X_jP) {
   PrintedOrigin origin;
   if (row.is_plain) {
-    origin = PrintPose(X_jP.inverse() * joint.X_PB *
-                       CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d) * row.X_iL);
+    origin = PrintPose(X_jP.inverse() * CalcRowPose(joint) * row.X_iL);
     if (!TurnRollPitchYaw(row.rpy).isApprox(origin.CalcRotation(), 1e-9)) return origin;
     origin.r.head<3>() = row.rpy;
     origin.half_r.head<3>() = FindHalves<3>(row.rpy);

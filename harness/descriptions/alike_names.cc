@@ -7,7 +7,7 @@
 #include <map>
 
 #include "controller/common/text.h"
-#include "harness/descriptions/link_frame_tree.h"
+#include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {
 

@@ -13,17 +13,6 @@ const MassProperties& BodyOf(const RobotModel& model, int link) {
 
 }  // namespace
 
-std::vector<int> ListChain(const RobotModel& model, int link) {
-  std::vector<int> chain;
-  for (int joint = link; joint >= 0; joint = model.joint(joint).parent) {
-    for (int k = 0; k < CountVelocities(model.joint(joint).type); ++k)
-      chain.push_back(model.num_base_velocities() + model.dof(joint) + k);
-  }
-  for (int i = model.num_base_velocities() - 1; i >= 0; --i) chain.push_back(i);
-  std::ranges::sort(chain);
-  return chain;
-}
-
 CoordinateMap::CoordinateMap(const RobotModel& model, std::vector<int> compared)
     : positions(ListIndices(model.num_positions())),
       velocities(ListIndices(model.num_velocities())),
@@ -53,7 +42,8 @@ AnalyticProvider::AnalyticProvider(const RobotModel& model, std::string name, st
   has_object_ = model.object().has_value();
   xi_.setZero(model.num_velocities());
   jacobians_.resize(map_.compared_frames.size());
-  for (const int frame : map_.compared_frames) chains_.push_back(ListChain(model, model.frame(frame).link));
+  for (const int frame : map_.compared_frames)
+    chains_.push_back(model.ListMovingEntries(model.frame(frame).link));
 }
 
 AnalyticProvider::AnalyticProvider(const RobotModel& model, std::string name, CoordinateMap map,

@@ -83,9 +83,6 @@ struct CoordinateMap {
   std::vector<int> compared_frames;  ///< Whose Jacobians are compared, in the order of the comparison.
 };
 
-/// Coordinates of xi that move a link, ascending: the base's, then those of the joints between.
-std::vector<int> ListChain(const RobotModel& model, int link);
-
 /// The analytic model as a provider.
 class AnalyticProvider : public MechanismProvider {
  public:

@@ -21,6 +21,19 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kLongest = 10.0;  // m, of an offset or a slide
 
+/// The body in whose place a file's would not stand out: a uniform solid sphere of its mass and the density
+/// of water, at its centre of mass.
+MassProperties MakePlausibleBody(const MassProperties& body) {
+  constexpr double kDensityOfWater = 1000.0;  // kg/m^3
+  constexpr double kLeastMass = 1e-3;         // kg, of a part that has none
+  MassProperties plausible = body;
+  if (!(plausible.mass > 0.0) || !std::isfinite(plausible.mass)) plausible.mass = kLeastMass;
+  if (!plausible.com.allFinite()) plausible.com.setZero();
+  const double radius = std::cbrt(3.0 * plausible.mass / (4.0 * std::numbers::pi * kDensityOfWater));
+  plausible.inertia = CalcUniformInertia(SolidSphere{radius}, plausible.mass);
+  return plausible;
+}
+
 /// The whole bodies that joints move, some of which no body can have.
 struct Bodies {
   RobotSpec spec;                ///< With plausible bodies in the place of impossible ones.
@@ -256,6 +269,23 @@ class JointAudit {
   std::vector<AuditFinding>& findings_;
 };
 
+/// Condition numbers, with and without each finding about a body.
+void AuditCondition(const RobotDescription& robot, AuditResult* result) {
+  result->condition = CalcCondition(robot, robot.spec);
+  std::map<int, double> without;  // by body
+  for (AuditFinding& finding : result->findings) {
+    const bool is_moving =
+        finding.body >= 0 || (finding.body == -1 && robot.spec.base.type != BaseType::kFixed);
+    if (!is_moving || finding.level == AuditLevel::kNote) continue;
+    if (!without.contains(finding.body)) {
+      RobotSpec spec = robot.spec;
+      BodyOf(spec, finding.body) = MakePlausibleBody(BodyOf(spec, finding.body));
+      without[finding.body] = CalcCondition(robot, spec);
+    }
+    finding.condition_without = without[finding.body];
+  }
+}
+
 }  // namespace
 
 const char* NameOf(AuditLevel level) {
@@ -268,44 +298,11 @@ bool AuditResult::IsGood() const {
                              [](const AuditFinding& finding) { return finding.level == AuditLevel::kNote; });
 }
 
-MassProperties MakePlausibleBody(const MassProperties& body) {
-  constexpr double kDensityOfWater = 1000.0;  // kg/m^3
-  constexpr double kLeastMass = 1e-3;         // kg, of a part that has none
-  MassProperties plausible = body;
-  if (!(plausible.mass > 0.0) || !std::isfinite(plausible.mass)) plausible.mass = kLeastMass;
-  if (!plausible.com.allFinite()) plausible.com.setZero();
-  const double radius = std::cbrt(3.0 * plausible.mass / (4.0 * std::numbers::pi * kDensityOfWater));
-  plausible.inertia = CalcUniformInertia(SolidSphere{radius}, plausible.mass);
-  return plausible;
-}
-
-void AuditJoints(const RobotDescription& robot, std::vector<AuditFinding>* findings) {
-  JointAudit(robot, findings).Run();
-}
-
-void AuditCondition(const RobotDescription& robot, AuditResult* result) {
-  result->condition = CalcCondition(robot, robot.spec);
-  std::map<int, double> without;  // by body
-  for (AuditFinding& finding : result->findings) {
-    const bool is_moving =
-        finding.body >= 0 || (finding.body == -1 && robot.spec.base.type != BaseType::kFixed);
-    if (!is_moving || finding.level == AuditLevel::kNote) continue;
-    if (!without.contains(finding.body)) {
-      RobotSpec spec = robot.spec;
-      MassProperties* body =
-          finding.body < 0 ? &spec.base.body : &spec.joints[static_cast<size_t>(finding.body)].body;
-      *body = MakePlausibleBody(*body);
-      without[finding.body] = CalcCondition(robot, spec);
-    }
-    finding.condition_without = without[finding.body];
-  }
-}
-
 AuditResult AuditRobot(const RobotDescription& robot) {
   AuditResult result;
   AuditBodies(robot, &result.findings);
   AuditMirrors(robot, &result.findings);
-  AuditJoints(robot, &result.findings);
+  JointAudit(robot, &result.findings).Run();
   AuditCondition(robot, &result);
   std::ranges::stable_sort(result.findings,
                            [](const AuditFinding& a, const AuditFinding& b) { return a.level < b.level; });

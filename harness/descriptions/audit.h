@@ -52,13 +52,5 @@ AuditResult AuditRobot(const RobotDescription& robot);
 void AuditBodies(const RobotDescription& robot, std::vector<AuditFinding>* findings);
 /// Left against right.
 void AuditMirrors(const RobotDescription& robot, std::vector<AuditFinding>* findings);
-/// Ranges, axes, names, and what joints move.
-void AuditJoints(const RobotDescription& robot, std::vector<AuditFinding>* findings);
-/// Condition numbers, with and without each finding about a body.
-void AuditCondition(const RobotDescription& robot, AuditResult* result);
-
-/// The body in whose place a file's would not stand out: a uniform solid sphere of its mass and the density
-/// of water, at its centre of mass.
-MassProperties MakePlausibleBody(const MassProperties& body);
 
 }  // namespace dexcheck

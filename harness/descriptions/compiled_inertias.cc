@@ -11,8 +11,8 @@
 
 #include "controller/common/text.h"
 #include "controller/model/rigid_body.h"
-#include "harness/descriptions/link_frame_tree.h"
 #include "harness/descriptions/mjcf_reader.h"
+#include "harness/descriptions/robot_description.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/xml.h"
@@ -140,9 +140,7 @@ std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjMo
   std::vector<std::string> names;
   double largest = 0.0;
   for (const LinkPlace& place : places) {
-    const bool is_base = place.a < 0;
-    Joint* const joint = is_base ? nullptr : &robot->spec.joints[static_cast<size_t>(place.a)];
-    MassProperties& own = is_base ? robot->spec.base.body : joint->body;
+    MassProperties& own = BodyOf(robot->spec, place.a);
     // The compiler's change, along the axes of the description's frame.
     Matrix3d change = Matrix3d::Zero();
     for (const DescribedPart& part : compiled.parts) {
@@ -153,9 +151,7 @@ std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjMo
       const Matrix3d R = (place.X_ab * part.X_iL).linear();
       change += R * (part.body.inertia - *tensor) * R.transpose();
     }
-    const MassProperties other =
-        ExpressIn(is_base ? compiled.spec.base.body : compiled.spec.joints[static_cast<size_t>(place.b)].body,
-                  place.X_ab);
+    const MassProperties other = ExpressIn(BodyOf(compiled.spec, place.b), place.X_ab);
     // Tensors are turned a few times and moved to the common centre of mass.
     const double rounding = 64.0 * std::numeric_limits<double>::epsilon() *
                             (own.inertia.trace() + own.mass * own.com.squaredNorm());
@@ -163,7 +159,7 @@ std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjMo
     if (change.norm() <= rounding || !was_written) continue;
     largest = std::max(largest, change.norm() / own.inertia.norm());
     own.inertia += 0.5 * (change + change.transpose());
-    names.push_back(is_base ? robot->spec.base.link : joint->link);
+    names.push_back(LinkOf(robot->spec, place.a));
   }
   if (names.empty()) return std::nullopt;
   return fmt::format(

@@ -54,9 +54,6 @@ std::string FormatAngles(const Vector3d& angles) {
   return "[" + format(angles[0]) + ", " + format(angles[1]) + ", " + format(angles[2]) + "]";
 }
 
-/// A comment's text on one line.
-std::string FormatComment(const std::string& text) { return Abbreviate(text); }
-
 /// ", xyz = ..., rpy = ...": what is not zero; always xyz when `always`.
 std::string FormatPose(const Pose& X, bool always) {
   const Vector3d xyz = X.translation();
@@ -71,7 +68,8 @@ std::string FormatPose(const Pose& X, bool always) {
 
 class ParameterWriter {
  public:
-  explicit ParameterWriter(const RobotDescription& robot) : robot_(robot), spec_(robot.spec) {}
+  explicit ParameterWriter(const RobotDescription& robot)
+      : robot_(robot), spec_(robot.spec), rows_(ListJointsInLinkFrames(robot)) {}
 
   std::string Write(const std::string& origin) {
     if (spec_.base.type != BaseType::kFixed && spec_.base.type != BaseType::kFloating) {
@@ -89,20 +87,9 @@ class ParameterWriter {
   }
 
  private:
-  /// The frame that is written for a link: at the joint, along the axes of the link's own frame.
-  [[nodiscard]] Pose WrittenFrame(int joint) const {
-    Pose X_iW = Pose::Identity();
-    if (joint >= 0) X_iW.linear() = robot_.joints[static_cast<size_t>(joint)].X_iL.linear();
-    return X_iW;
-  }
-
-  [[nodiscard]] const std::string& LinkName(int joint) const {
-    return joint < 0 ? spec_.base.link : spec_.joints[static_cast<size_t>(joint)].link;
-  }
-
   void WriteHead(const std::string& origin) {
-    text_ += kImportMark + FormatComment(origin) + ".\n";
-    for (const std::string& note : robot_.notes) text_ += "# Note: " + FormatComment(note) + ".\n";
+    text_ += kImportMark + Abbreviate(origin) + ".\n";
+    for (const std::string& note : robot_.notes) text_ += "# Note: " + Abbreviate(note) + ".\n";
     text_ += R"(#
 # Each row is a joint and the link that it moves. The link's frame stands at xyz (m), rpy (rad; R = Rz(yaw)
 # Ry(pitch) Rx(roll)) in its parent's frame when the joint is at zero, and turns about, or moves along, axis
@@ -125,30 +112,24 @@ class ParameterWriter {
   }
 
   void WriteChain(size_t begin, size_t end) {
-    text_ += "[[chain]]\nparent = " + QuoteToml(LinkName(spec_.joints[begin].parent)) + "\nrows = [\n";
-    for (size_t i = begin; i < end; ++i) WriteRow(spec_.joints[i], static_cast<int>(i));
+    text_ += "[[chain]]\nparent = " + QuoteToml(LinkOf(spec_, spec_.joints[begin].parent)) + "\nrows = [\n";
+    for (size_t i = begin; i < end; ++i) WriteRow(spec_.joints[i], rows_[i]);
     text_ += "]\n\n[chain.joints]\n";
     for (size_t i = begin; i < end; ++i) WriteJoint(spec_.joints[i], robot_.joints[i]);
     text_ += "\n";
-    for (size_t i = begin; i < end; ++i) WriteLink(spec_.joints[i], WrittenFrame(static_cast<int>(i)));
+    for (size_t i = begin; i < end; ++i) {
+      text_ += "[chain.links." + QuoteToml(spec_.joints[i].link) + "]\n";
+      WriteBody(rows_[i].body);
+    }
     text_ += "\n";
   }
 
-  void WriteRow(const Joint& joint, int index) {
+  void WriteRow(const Joint& joint, const JointInLinkFrames& row) {
     text_ += "  { joint = " + QuoteToml(joint.name) + ", link = " + QuoteToml(joint.link);
-    if (joint.type == JointType::kBall) {
-      text_ += ", type = \"ball\"";
-      text_ +=
-          FormatPose(WrittenFrame(joint.parent).inverse() * joint.X_PB * WrittenFrame(index), true) + " },\n";
-      return;
-    }
-    const Pose home = CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d);
-    const Pose X_iW = WrittenFrame(index);
-    const Pose X_PW = WrittenFrame(joint.parent).inverse() * joint.X_PB * home * X_iW;
-    const Vector3d axis = X_iW.linear().row(2).transpose();
-    if (joint.type == JointType::kPrismatic) text_ += ", type = \"prismatic\"";
-    text_ += FormatPose(X_PW, true);
-    if (axis != Vector3d::UnitZ()) text_ += ", axis = " + FormatTidyList(axis, 1.0);
+    if (joint.type != JointType::kRevolute) text_ += ", type = \"" + std::string(NameOf(joint.type)) + "\"";
+    text_ += FormatPose(row.X_PL, true);
+    if (joint.type != JointType::kBall && row.axis != Vector3d::UnitZ())
+      text_ += ", axis = " + FormatTidyList(row.axis, 1.0);
     text_ += " },\n";
   }
 
@@ -173,11 +154,6 @@ class ParameterWriter {
     text_ += unstated + "\n";
   }
 
-  void WriteLink(const Joint& joint, const Pose& X_iW) {
-    text_ += "[chain.links." + QuoteToml(joint.link) + "]\n";
-    WriteBody(ExpressIn(joint.body, X_iW.inverse()));
-  }
-
   void WriteBody(const MassProperties& body) {
     text_ += "mass = " + FormatTidy(body.mass, body.mass) +
              "\ncom = " + FormatTidyList(body.com, body.com.norm()) +
@@ -185,9 +161,9 @@ class ParameterWriter {
   }
 
   void WriteFrame(const Frame& frame) {
-    const Pose X_WF = WrittenFrame(frame.link).inverse() * frame.X_LF;
-    text_ +=
-        "[[frame]]\nname = " + QuoteToml(frame.name) + "\nlink = " + QuoteToml(LinkName(frame.link)) + "\n";
+    const Pose X_WF = PlaceOnAxis(robot_, frame.link).inverse() * frame.X_LF;
+    text_ += "[[frame]]\nname = " + QuoteToml(frame.name) +
+             "\nlink = " + QuoteToml(LinkOf(spec_, frame.link)) + "\n";
     const Vector3d rpy = CalcRollPitchYaw(X_WF.linear());
     text_ += "xyz = " + FormatTidyList(X_WF.translation(), X_WF.translation().norm()) + "\n";
     if (rpy.norm() > kPrintedRounding) text_ += "rpy = " + FormatAngles(rpy) + "\n";
@@ -197,6 +173,7 @@ class ParameterWriter {
 
   const RobotDescription& robot_;
   const RobotSpec& spec_;
+  std::vector<JointInLinkFrames> rows_;
   std::string text_;
 };
 
@@ -303,8 +280,7 @@ std::string WriteMjcf(const RobotDescription& robot, const std::string& origin) 
     XMLElement* const body = bodies[static_cast<size_t>(joint.parent + 1)]->InsertNewChildElement("body");
     bodies.push_back(body);
     body->SetAttribute("name", joint.link.c_str());
-    const MdhRow& row = joint.mdh;
-    SetPose(joint.X_PB * CalcMdhTransform(row.alpha, row.a, row.q, row.d), body);
+    SetPose(CalcRowPose(joint), body);
     AddJoint(joint, robot.joints[i].states_range, body);
     AddInertial(joint.body, body);
   }

@@ -52,36 +52,19 @@ BaseConvention ReadConvention(const Json& table, const std::string& source) {
   return convention;
 }
 
-void RequireList(const Json& list, Eigen::Index size, const char* of, const std::string& key,
-                 const std::string& source) {
-  if (list.is_array() && list.size() == static_cast<size_t>(size)) return;
-  Fail(source, key,
-       "must be a list of " + std::to_string(size) + " " + of + ", got " +
-           (list.is_array() ? std::to_string(list.size()) : Abbreviate(list.dump())));
-}
-
-double ReadNumber(const Json& value, const std::string& key, const std::string& source) {
-  if (!value.is_number()) Fail(source, key, "must be a number, got " + Abbreviate(value.dump()));
-  return value.get<double>();
-}
-
-VectorXd ReadVector(const Json& list, Eigen::Index size, const std::string& key, const std::string& source) {
-  RequireList(list, size, "numbers", key, source);
-  VectorXd values(size);
-  for (Eigen::Index i = 0; i < size; ++i) {
-    values[i] = ReadNumber(list[static_cast<size_t>(i)], key + "[" + std::to_string(i) + "]", source);
+/// Reads a number, a list of n numbers, or a list of n such lists.
+void ReadNumbers(const Json& json, int dimensions, size_t n, const std::string& key,
+                 const std::string& source, std::vector<double>* numbers) {
+  if (dimensions == 0) {
+    if (!json.is_number()) Fail(source, key, "must be a number, got " + Abbreviate(json.dump()));
+    return numbers->push_back(json.get<double>());
   }
-  return values;
-}
-
-MatrixXd ReadMatrix(const Json& rows, Eigen::Index size, const std::string& key, const std::string& source) {
-  RequireList(rows, size, "rows", key, source);
-  MatrixXd M(size, size);
-  for (Eigen::Index i = 0; i < size; ++i) {
-    M.row(i) = ReadVector(rows[static_cast<size_t>(i)], size, key + "[" + std::to_string(i) + "]", source)
-                   .transpose();
-  }
-  return M;
+  if (!json.is_array() || json.size() != n)
+    Fail(source, key,
+         "must be a list of " + std::to_string(n) + (dimensions == 2 ? " rows" : " numbers") + ", got " +
+             (json.is_array() ? std::to_string(json.size()) : Abbreviate(json.dump())));
+  for (size_t i = 0; i < n; ++i)
+    ReadNumbers(json[i], dimensions - 1, n, key + "[" + std::to_string(i) + "]", source, numbers);
 }
 
 }  // namespace
@@ -227,26 +210,18 @@ std::optional<Json> ParseResult(std::string_view text) {
 
 TermResults ReadResult(const Json& json, const ProgramLayout& layout, const VectorXd& v,
                        const std::string& source) {
-  const Eigen::Index n = layout.size();
-  TermResults terms;
-  const auto find = [&](const char* key) { return json.contains(key) ? &json.at(key) : nullptr; };
-  if (const Json* M = find("M")) terms.M = ReadMatrix(*M, n, "M", source);
-  if (const Json* C = find("C")) terms.coriolis = ReadMatrix(*C, n, "C", source) * v;
-  if (const Json* c = find("c")) terms.coriolis = ReadVector(*c, n, "c", source);
-  if (const Json* g = find("g")) terms.gravity = ReadVector(*g, n, "g", source);
-  if (const Json* h = find("h")) terms.bias = ReadVector(*h, n, "h", source);
-  if (const Json* friction = find("friction")) terms.friction = ReadVector(*friction, n, "friction", source);
-  if (const Json* T = find("kinetic_energy")) terms.kinetic = ReadNumber(*T, "kinetic_energy", source);
-  if (const Json* U = find("potential_energy")) terms.potential = ReadNumber(*U, "potential_energy", source);
-  constexpr Term kAll[] = {Term::kMBar,     Term::kCBarXi,        Term::kGravity,        Term::kBias,
-                           Term::kFriction, Term::kKineticEnergy, Term::kPotentialEnergy};
-  if (std::ranges::none_of(kAll, [&](Term term) { return terms.Has(term); })) {
+  if (std::ranges::none_of(kResultKeys, [&](const ResultKey& key) { return json.contains(key.name); })) {
     throw InputError(source +
                      ": must have M, C, c, g, h, friction, kinetic_energy or potential_energy, got " +
                      Abbreviate(json.dump()));
   }
-  terms.AddBias();
-  return terms;
+  return CollectTerms(v, [&](const ResultKey& key) {
+    std::vector<double> numbers;
+    if (json.contains(key.name))
+      ReadNumbers(json.at(key.name), key.dimensions, static_cast<size_t>(layout.size()), key.name, source,
+                  &numbers);
+    return numbers;
+  });
 }
 
 }  // namespace dexcheck

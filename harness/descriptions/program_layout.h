@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "harness/descriptions/base_convention.h"
 #include "harness/descriptions/robot_description.h"
+#include "harness/descriptions/term_results.h"
 
 namespace dexcheck {
 

@@ -23,15 +23,6 @@ constexpr size_t kLongestResult = size_t{1} << 26;
 // Bytes of standard error that are kept: enough for the last line of a traceback.
 constexpr size_t kKeptMessages = 4096;
 
-void Close(int* descriptor) {
-  if (*descriptor >= 0) ::close(*descriptor);
-  *descriptor = -1;
-}
-
-void SetNonBlocking(int descriptor) {
-  ::fcntl(descriptor, F_SETFL, ::fcntl(descriptor, F_GETFL) | O_NONBLOCK);
-}
-
 }  // namespace
 
 ProgramProcess::ProgramProcess(std::string command, double seconds)
@@ -42,27 +33,21 @@ ProgramProcess::ProgramProcess(std::string command, double seconds)
   const bool piped = ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, in) == 0 &&
                      ::pipe2(out, O_CLOEXEC) == 0 && ::pipe2(err, O_CLOEXEC) == 0;
   const int error = errno;
-  input_ = in[0];
-  output_ = out[0];
-  messages_ = err[0];
-  const auto close = [&](std::initializer_list<int*> ends) {
-    for (int* const end : ends) Close(end);
-  };
+  input_ = FileDescriptor(in[0]);
+  output_ = FileDescriptor(out[0]);
+  messages_ = FileDescriptor(err[0]);
+  const FileDescriptor of_program[] = {FileDescriptor(in[1]), FileDescriptor(out[1]), FileDescriptor(err[1])};
   try {
     if (!piped) throw Error(std::generic_category().message(error));
     child_.emplace("program", Program{{"/bin/sh", "-c", command_}, in[1], out[1], err[1]});
   } catch (const Error& failure) {
-    close({&in[1], &out[1], &err[1], &input_, &output_, &messages_});
-    throw ProgramError("program " + Quote(command_) + ": cannot be started: " + failure.what());
+    Fail(std::string("cannot be started: ") + failure.what());
   }
-  close({&in[1], &out[1], &err[1]});
-  for (const int descriptor : {input_, output_, messages_}) SetNonBlocking(descriptor);
+  for (const int own : {in[0], out[0], err[0]}) ::fcntl(own, F_SETFL, ::fcntl(own, F_GETFL) | O_NONBLOCK);
 }
 
-ProgramProcess::~ProgramProcess() {
-  Close(&input_);
-  Close(&output_);
-  Close(&messages_);
+void ProgramProcess::Fail(const std::string& problem) const {
+  throw ProgramError("program " + Quote(command_) + ": " + problem + LastWords());
 }
 
 std::string ProgramProcess::LastWords() const {
@@ -76,20 +61,19 @@ void ProgramProcess::FailEnded() {
   // The pipes are closed; what closed them without ending gets a moment.
   const std::optional<ProcessEnd> end = child_->WaitFor(0.5);
   ReadMessages();
-  const std::string key = "program " + Quote(command_) + ": ";
   const std::string after =
       results_ == 0 ? " before its first result" : " after " + std::to_string(results_) + " results";
-  if (!end) throw ProgramError(key + "closed its standard output" + after + LastWords());
+  if (!end) Fail("closed its standard output" + after);
   constexpr int kCannotRun = 126;
   if (results_ == 0 && (end->exit_code == kCannotRun || end->exit_code == kNotFoundExitCode)) {
-    throw InputError(key + "cannot be run" + LastWords());
+    throw InputError("program " + Quote(command_) + ": cannot be run" + LastWords());
   }
-  throw ProgramError(key + end->Describe() + after + LastWords());
+  Fail(end->Describe() + after);
 }
 
 void ProgramProcess::Write(const std::string& text, size_t* written) {
   const ssize_t count =
-      ::send(input_, text.data() + *written, text.size() - *written, MSG_NOSIGNAL | MSG_DONTWAIT);
+      ::send(input_.get(), text.data() + *written, text.size() - *written, MSG_NOSIGNAL | MSG_DONTWAIT);
   if (count > 0) *written += static_cast<size_t>(count);
   // A program that reads no more may still have written: its output says what became of it.
   if (count < 0 && errno != EAGAIN && errno != EINTR) *written = text.size();
@@ -97,7 +81,7 @@ void ProgramProcess::Write(const std::string& text, size_t* written) {
 
 bool ProgramProcess::ReadOutput() {
   char buffer[1 << 16];
-  const ssize_t count = ::read(output_, buffer, sizeof buffer);
+  const ssize_t count = ::read(output_.get(), buffer, sizeof buffer);
   if (count < 0 && (errno == EAGAIN || errno == EINTR)) return true;
   if (count <= 0) return false;
   pending_.append(buffer, static_cast<size_t>(count));
@@ -106,10 +90,10 @@ bool ProgramProcess::ReadOutput() {
 
 void ProgramProcess::ReadMessages() {
   char buffer[4096];
-  while (messages_ >= 0) {
-    const ssize_t count = ::read(messages_, buffer, sizeof buffer);
+  while (messages_.is_open()) {
+    const ssize_t count = ::read(messages_.get(), buffer, sizeof buffer);
     if (count < 0 && errno == EINTR) continue;
-    if (count == 0) Close(&messages_);
+    if (count == 0) messages_.Close();
     if (count <= 0) return;
     said_.append(buffer, static_cast<size_t>(count));
     if (said_.size() > kKeptMessages) said_.erase(0, said_.size() - kKeptMessages);
@@ -132,24 +116,19 @@ std::string ProgramProcess::Query(const std::string& line) {
       return result;
     }
     searched = written == text.size() ? pending_.size() : 0;
-    const std::string key = "program " + Quote(command_) + ": ";
-    if (pending_.size() > kLongestResult) {
-      throw ProgramError(key + "writes without end, more than " + std::to_string(kLongestResult >> 20) +
-                         " MB without an end of line");
-    }
+    if (pending_.size() > kLongestResult)
+      Fail("writes without end, more than " + std::to_string(kLongestResult >> 20) +
+           " MB without an end of line");
     const double left = std::chrono::duration<double>(deadline - Clock::now()).count();
     if (left <= 0.0) {
       ReadMessages();
-      throw ProgramError(key + "wrote no result within " + FormatNumber(seconds_) + " s (--time-limit)" +
-                         LastWords());
+      Fail("wrote no result within " + FormatNumber(seconds_) + " s (--time-limit)");
     }
-    pollfd ends[3] = {{output_, POLLIN, 0}, {messages_, POLLIN, 0}, {input_, POLLOUT, 0}};
+    pollfd ends[3] = {{output_.get(), POLLIN, 0}, {messages_.get(), POLLIN, 0}, {input_.get(), POLLOUT, 0}};
     const nfds_t count = written < text.size() ? 3 : 2;
     constexpr double kLongestWait = 1.0;  // s, so that a deadline far away overflows nothing
     const int ready = ::poll(ends, count, static_cast<int>(1e3 * std::min(left, kLongestWait)) + 1);
-    if (ready < 0 && errno != EINTR) {
-      throw ProgramError(key + "cannot be talked to: " + std::generic_category().message(errno));
-    }
+    if (ready < 0 && errno != EINTR) Fail("cannot be talked to: " + std::generic_category().message(errno));
     if (ready <= 0) continue;
     if ((ends[1].revents & (POLLIN | POLLHUP)) != 0) ReadMessages();
     if (count == 3 && ends[2].revents != 0) Write(text, &written);
@@ -166,14 +145,12 @@ OrderedJson ToList(const VectorXd& values) { return std::vector<double>(values.b
 
 OrderedJson MakeHello(const RobotDescription& robot, const ProgramLayout& layout) {
   OrderedJson joints = OrderedJson::array();
-  for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
-    const Joint& joint = robot.spec.joints[i];
+  for (const Joint& joint : robot.spec.joints) {
     joints.push_back({{"name", joint.name}, {"type", NameOf(joint.type)}});
-    if (!robot.spec.joints[i].coupling) continue;
-    joints.back()["follows"] =
-        robot.spec.joints[static_cast<size_t>(robot.spec.joints[i].coupling->leader)].name;
-    joints.back()["multiplier"] = robot.spec.joints[i].coupling->multiplier;
-    joints.back()["offset"] = robot.spec.joints[i].coupling->offset;
+    if (!joint.coupling) continue;
+    joints.back()["follows"] = robot.spec.joints[static_cast<size_t>(joint.coupling->leader)].name;
+    joints.back()["multiplier"] = joint.coupling->multiplier;
+    joints.back()["offset"] = joint.coupling->offset;
   }
   const auto& g = robot.spec.gravity;
   return {{"dexcheck_protocol", kProgramProtocol},
@@ -216,13 +193,12 @@ Json ProgramProvider::Query(const OrderedJson& request) {
     throw InputError(source_ + ": must write a JSON object on one line (NaN and Infinity are none), got " +
                      Quote(line));
   }
-  const Json& result = *parsed;
-  if (result.contains("error")) {
-    const Json& error = result.at("error");
+  if (parsed->contains("error")) {
+    const Json& error = parsed->at("error");
     throw ProgramError(source_ +
                        ": says: " + Abbreviate(error.is_string() ? error.get<std::string>() : error.dump()));
   }
-  return result;
+  return *parsed;
 }
 
 TermResults ProgramProvider::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {

@@ -24,10 +24,6 @@ class ProgramProcess {
   /// @param seconds within which each result must come.
   /// @throws ProgramError when no process can be made.
   ProgramProcess(std::string command, double seconds);
-  ~ProgramProcess();
-  ProgramProcess(const ProgramProcess&) = delete;
-  ProgramProcess& operator=(const ProgramProcess&) = delete;
-
   /// Sends a line and returns the next line of standard output, without its end.
   /// @throws ProgramError when the program ends, hangs or writes without end, InputError when the shell
   /// knows no such command.
@@ -39,15 +35,17 @@ class ProgramProcess {
   void Write(const std::string& text, size_t* written);
   bool ReadOutput();
   void ReadMessages();
+  /// @throws ProgramError "program "COMMAND": PROBLEM, its last words: ...".
+  [[noreturn]] void Fail(const std::string& problem) const;
   [[noreturn]] void FailEnded();
   [[nodiscard]] std::string LastWords() const;
 
   std::string command_;
   double seconds_;
   std::optional<ChildProcess> child_;
-  int input_ = -1;     // a socket: what cannot be written is an error, not a signal
-  int output_ = -1;    // standard output
-  int messages_ = -1;  // standard error
+  FileDescriptor input_;     // a socket: what cannot be written is an error, not a signal
+  FileDescriptor output_;    // standard output
+  FileDescriptor messages_;  // standard error
   std::string pending_;
   std::string said_;  // the end of standard error
   long results_ = 0;

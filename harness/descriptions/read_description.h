@@ -10,7 +10,6 @@
 #include <string_view>
 #include <vector>
 
-#include "harness/descriptions/body_table.h"
 #include "harness/descriptions/robot_description.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/engine/engine.h"
@@ -22,6 +21,21 @@ namespace dexcheck {
 /// of the name's end, so that an empty .xml is no parameter file.
 /// @throws InputError "FILE: must be ..." for other XML.
 RobotFormat FindFormat(std::string_view text, const std::filesystem::path& path);
+
+/// A row of a table of bodies as CAD programs export it: masses, centres of mass and inertias of links, no
+/// joints.
+struct TabledBody {
+  std::string link;
+  MassProperties body;  ///< In the link's own frame.
+  int line = 0;
+};
+
+/// Reads lines of values between commas or semicolons under a header of "link", "mass [g]", "com_x [mm]",
+/// "com_y", "com_z", "ixx [g*mm^2]", "iyy", "izz", "ixy", "ixz", "iyz". A column without a unit has that of
+/// the column before of its kind, or is in SI. Inertias are about the centre of mass, unless a line before
+/// says "# inertia: origin".
+/// @throws InputError "SOURCE:LINE: ..." for what is missing or no number.
+std::vector<TabledBody> ReadBodyTable(const std::string& text, const std::string& source);
 
 /// A parameter file, a URDF, a table of bodies, or an MJCF, which the engine compiles.
 class DescriptionFile {
@@ -39,7 +53,8 @@ class DescriptionFile {
   [[nodiscard]] RobotDescription Describe() const;
   /// Returns the robot, or nothing for such an MJCF.
   [[nodiscard]] std::optional<RobotDescription> TryToDescribe() const;
-  /// Puts the bodies on another file's robot. @pre the format is kBodies. @throws InputError as PlaceBodies.
+  /// Puts the bodies on another file's robot. @pre the format is kBodies. @throws InputError when it has none
+  /// of the links.
   void PlaceOn(const RobotDescription& other);
   /// That robot; none before.
   [[nodiscard]] const std::optional<RobotDescription>& carrier() const { return carrier_; }

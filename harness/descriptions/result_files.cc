@@ -21,10 +21,10 @@ std::string DescribeShape(const std::vector<size_t>& shape) {
   return text.empty() ? "one number" : text;
 }
 
-Eigen::Map<const VectorXd> MapRow(const NpyArray& array, long sample) {
-  size_t width = 1;
-  for (size_t i = 1; i < array.shape.size(); ++i) width *= array.shape[i];
-  return {array.values.data() + static_cast<size_t>(sample) * width, static_cast<Eigen::Index>(width)};
+/// The numbers of one state.
+Eigen::Map<const VectorXd> MapRow(const NpyArray& array, size_t sample) {
+  const size_t width = array.values.size() / array.shape[0];
+  return {array.values.data() + sample * width, static_cast<Eigen::Index>(width)};
 }
 
 ProgramLayout ReadLayout(const std::filesystem::path& path, const RobotDescription& robot) {
@@ -58,8 +58,7 @@ StateTable DrawStates(const RobotDescription& robot, long count, const StateRang
 std::string WriteStateLines(const StateTable& states) {
   std::string lines;
   for (size_t sample = 0; sample < states.q.shape[0]; ++sample) {
-    const auto q = MapRow(states.q, static_cast<long>(sample));
-    const auto v = MapRow(states.v, static_cast<long>(sample));
+    const auto q = MapRow(states.q, sample), v = MapRow(states.v, sample);
     const OrderedJson line = {{"id", sample},
                               {"q", std::vector<double>(q.begin(), q.end())},
                               {"v", std::vector<double>(v.begin(), v.end())}};
@@ -92,13 +91,12 @@ ResultFiles::ResultFiles(const std::filesystem::path& folder, const RobotDescrip
     return;
   }
   const auto n = static_cast<size_t>(layout().size());
-  const auto find = [&](const std::string& term, const std::vector<size_t>& shape) {
-    const std::string file = term + ".npy";
-    if (Exists(folder_ / file)) terms_.emplace(term, ReadArray(file, shape));
-  };
-  for (const char* term : {"M", "C"}) find(term, {count, n, n});
-  for (const char* term : {"c", "g", "h", "friction"}) find(term, {count, n});
-  for (const char* term : {"kinetic_energy", "potential_energy"}) find(term, {count});
+  for (const ResultKey& key : kResultKeys) {
+    std::vector<size_t> shape = {count};
+    shape.resize(shape.size() + static_cast<size_t>(key.dimensions), n);
+    const std::string file = std::string(key.name) + ".npy";
+    if (Exists(folder_ / file)) terms_.emplace(key.name, ReadArray(file, shape));
+  }
   if (!terms_.empty()) return;
   throw InputError(folder.string() +
                    ": must have results: M.npy, C.npy, c.npy, g.npy, h.npy, friction.npy, "
@@ -123,9 +121,8 @@ void ResultFiles::ReadLines(const std::filesystem::path& path) {
                        ", got " + Abbreviate(id.dump()));
     }
     const auto sample = id.get<size_t>();
-    const auto state = static_cast<long>(sample);
     lines_[sample] =
-        ReadResult(json, layout(), layout().WriteVelocities(Row(q_, state), Row(v_, state)), source);
+        ReadResult(json, layout(), layout().WriteVelocities(MapRow(q_, sample), MapRow(v_, sample)), source);
     seen[sample] = true;
   }
   const auto missing = std::ranges::find(seen, false);
@@ -136,14 +133,16 @@ void ResultFiles::ReadLines(const std::filesystem::path& path) {
 
 bool ResultFiles::ReadState(DynamicsState* state) const {
   if (state->sample >= count_) return false;
-  state->q = Row(q_, state->sample);
-  state->xi = Row(v_, state->sample);
+  state->q = MapRow(q_, static_cast<size_t>(state->sample));
+  state->xi = MapRow(v_, static_cast<size_t>(state->sample));
   return true;
 }
 
 NpyArray ResultFiles::ReadArray(const std::string& file, const std::vector<size_t>& shape) const {
   const std::string source = (folder_ / file).string();
-  NpyArray array = Check(ParseNpy(ReadBytes(folder_ / file, kMostData), source), source, shape);
+  NpyArray array = ParseNpy(ReadBytes(folder_ / file, kMostData), source);
+  if (array.shape != shape)
+    throw InputError(source + ": must be " + DescribeShape(shape) + ", got " + DescribeShape(array.shape));
   if (file != "q.npy" && file != "v.npy") return array;
   for (size_t i = 0; i < array.values.size(); ++i) {
     if (std::isfinite(array.values[i])) continue;
@@ -153,45 +152,19 @@ NpyArray ResultFiles::ReadArray(const std::string& file, const std::vector<size_
   return array;
 }
 
-NpyArray ResultFiles::Check(NpyArray array, const std::string& source, const std::vector<size_t>& shape) {
-  if (array.shape != shape) {
-    throw InputError(source + ": must be " + DescribeShape(shape) + ", got " + DescribeShape(array.shape));
-  }
-  return array;
-}
-
-VectorXd ResultFiles::Row(const NpyArray& array, long sample) { return MapRow(array, sample); }
-
-VectorXd ResultFiles::FindRow(const std::string& term, long sample) const {
-  const auto found = terms_.find(term);
-  return found == terms_.end() ? VectorXd() : Row(found->second, sample);
-}
-
 TermResults ResultFiles::Evaluate(long sample, const VectorXd& q, const VectorXd& xi) {
+  const auto state = static_cast<size_t>(sample);
   TermResults terms;
   if (!lines_.empty()) {
-    terms = lines_[static_cast<size_t>(sample)];
-    layout().ReadTerms(q, xi, &terms);
-    return terms;
+    terms = lines_[state];
+  } else {
+    terms = CollectTerms(layout().WriteVelocities(q, xi), [&](const ResultKey& key) {
+      const auto found = terms_.find(key.name);
+      if (found == terms_.end()) return std::vector<double>();
+      const auto row = MapRow(found->second, state);
+      return std::vector<double>(row.begin(), row.end());
+    });
   }
-  const Eigen::Index n = layout().size();
-  const auto matrix = [&](const char* term) {
-    // Rows as NumPy has them.
-    const VectorXd numbers = FindRow(term, sample);
-    return numbers.size() == 0 ? MatrixXd() : MatrixXd(Eigen::Map<const RowMatrixXd>(numbers.data(), n, n));
-  };
-  terms.M = matrix("M");
-  terms.coriolis = FindRow("c", sample);
-  const MatrixXd C = matrix("C");
-  if (C.size() > 0 && terms.coriolis.size() == 0) terms.coriolis = C * layout().WriteVelocities(q, xi);
-  terms.gravity = FindRow("g", sample);
-  terms.bias = FindRow("h", sample);
-  terms.friction = FindRow("friction", sample);
-  terms.AddBias();
-  const VectorXd kinetic = FindRow("kinetic_energy", sample);
-  const VectorXd potential = FindRow("potential_energy", sample);
-  if (kinetic.size() > 0) terms.kinetic = kinetic[0];
-  if (potential.size() > 0) terms.potential = potential[0];
   layout().ReadTerms(q, xi, &terms);
   return terms;
 }

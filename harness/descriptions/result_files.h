@@ -45,11 +45,7 @@ class ResultFiles : public LayoutProvider {
 
  private:
   [[nodiscard]] NpyArray ReadArray(const std::string& file, const std::vector<size_t>& shape) const;
-  [[nodiscard]] static NpyArray Check(NpyArray array, const std::string& source,
-                                      const std::vector<size_t>& shape);
   void ReadLines(const std::filesystem::path& path);
-  [[nodiscard]] static VectorXd Row(const NpyArray& array, long sample);
-  [[nodiscard]] VectorXd FindRow(const std::string& term, long sample) const;
 
   std::filesystem::path folder_;
   std::string name_;

@@ -3,11 +3,22 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "controller/common/text.h"
 #include "controller/model/rigid_body.h"
 
 namespace dexcheck {
+
+Pose CalcRowPose(const Joint& joint, double position) {
+  const bool slides = joint.type == JointType::kPrismatic;
+  return joint.X_PB * CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q + (slides ? 0.0 : position),
+                                       joint.mdh.d + (slides ? position : 0.0));
+}
+
+const std::string& LinkOf(const RobotSpec& robot, int joint) {
+  return joint < 0 ? robot.base.link : robot.joints[static_cast<size_t>(joint)].link;
+}
 
 MatrixXd CalcCouplingMap(const RobotSpec& robot) {
   const std::vector<Joint>& joints = robot.joints;
@@ -43,8 +54,7 @@ void FuseParts(RobotDescription* robot) {
   }
   // One part stays as it is: its sum would be rounded.
   const auto fuse = [&](size_t i) { return bodies[i].size() == 1 ? bodies[i][0] : Combine(bodies[i]); };
-  robot->spec.base.body = fuse(0);
-  for (size_t i = 1; i < bodies.size(); ++i) robot->spec.joints[i - 1].body = fuse(i);
+  for (size_t i = 0; i < bodies.size(); ++i) BodyOf(robot->spec, static_cast<int>(i) - 1) = fuse(i);
 }
 
 Matrix3d FindNearestInertia(const Matrix3d& inertia) {
@@ -160,6 +170,89 @@ std::vector<std::string> DescribeCoordinates(const RobotDescription& robot) {
   std::vector<std::string> notes = DescribeBase(robot);
   for (const std::string& note : DescribeBalls(robot)) notes.push_back(note);
   return notes;
+}
+
+namespace {
+
+bool HasParts(const RobotDescription& robot, int joint) {
+  return std::ranges::any_of(robot.parts, [&](const DescribedPart& part) { return part.joint == joint; });
+}
+
+}  // namespace
+
+Pose PlaceOnAxis(const RobotDescription& robot, int joint) {
+  Pose X_iL = Pose::Identity();
+  if (joint >= 0) X_iL.linear() = robot.joints[static_cast<size_t>(joint)].X_iL.linear();
+  return X_iL;
+}
+
+std::vector<JointInLinkFrames> ListJointsInLinkFrames(const RobotDescription& robot) {
+  std::vector<JointInLinkFrames> rows;
+  for (size_t i = 0; i < robot.spec.joints.size(); ++i) {
+    const Joint& joint = robot.spec.joints[i];
+    const Pose X_iL = PlaceOnAxis(robot, static_cast<int>(i));
+    rows.push_back({joint.parent, PlaceOnAxis(robot, joint.parent).inverse() * CalcRowPose(joint) * X_iL,
+                    X_iL.linear().row(2).transpose(),  // one of those that a ball joint turns about
+                    ExpressIn(joint.body, X_iL.inverse())});
+  }
+  return rows;
+}
+
+std::vector<Pose> CalcLinkPoses(const Pose& X_W0, const std::vector<JointInLinkFrames>& rows) {
+  std::vector<Pose> poses = {X_W0};
+  for (const JointInLinkFrames& row : rows)
+    poses.push_back(poses[static_cast<size_t>(row.parent + 1)] * row.X_PL);
+  return poses;
+}
+
+std::vector<Pose> PlaceLinkFrames(const RobotDescription& a, const RobotDescription& b) {
+  const auto calc_poses = [](const RobotDescription& robot) {
+    const Base& base = robot.spec.base;
+    const Pose X_W0 = base.type == BaseType::kFloating ? Pose::Identity() : base.X_B0;
+    return CalcLinkPoses(X_W0, ListJointsInLinkFrames(robot));
+  };
+  const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
+  const std::vector<Pose> poses_a = calc_poses(a), poses_b = calc_poses(b);
+  std::vector<Pose> placed(b_of_a.size(), Pose::Identity());
+  for (size_t i = 0; i < placed.size(); ++i) {
+    if (b_of_a[i] >= 0)
+      placed[i] = poses_a[i + 1].inverse(Eigen::Isometry) * poses_b[static_cast<size_t>(b_of_a[i] + 1)];
+  }
+  return placed;
+}
+
+std::vector<LinkPlace> PlaceLinks(const RobotDescription& a, const RobotDescription& b) {
+  const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
+  if (std::ranges::find(b_of_a, -1) != b_of_a.end()) return {};
+  const std::vector<Pose> placed = PlaceLinkFrames(a, b);
+  std::vector<LinkPlace> places;
+  if (a.spec.base.type == BaseType::kFloating) places.emplace_back();
+  for (size_t i = 0; i < b_of_a.size(); ++i) {
+    if (!HasParts(b, b_of_a[i])) continue;  // between several joints of one body there is none
+    places.push_back({static_cast<int>(i), b_of_a[i],
+                      PlaceOnAxis(a, static_cast<int>(i)) * placed[i] *
+                          PlaceOnAxis(b, b_of_a[i]).inverse(Eigen::Isometry)});
+  }
+  return places;
+}
+
+bool AddLinkFrames(RobotDescription* a, RobotDescription* b) {
+  std::set<int> has_frame;
+  std::set<std::string> taken;
+  for (const Frame& frame : a->spec.frames) has_frame.insert(frame.link);
+  for (const RobotDescription* const robot : {a, b}) {
+    for (const Frame& frame : robot->spec.frames) taken.insert(frame.name);
+  }
+  const size_t before = a->spec.frames.size();
+  for (const LinkPlace& place : PlaceLinks(*a, *b)) {
+    if (place.a < 0 || has_frame.contains(place.a)) continue;
+    const std::string& name = a->spec.joints[static_cast<size_t>(place.a)].link;
+    if (!taken.insert(name).second) continue;
+    const Pose& X_bL = b->joints[static_cast<size_t>(place.b)].X_iL;
+    a->spec.frames.push_back({name, place.a, place.X_ab * X_bL, {}});
+    b->spec.frames.push_back({name, place.b, X_bL, {}});
+  }
+  return a->spec.frames.size() > before;
 }
 
 }  // namespace dexcheck

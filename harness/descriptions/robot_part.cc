@@ -48,10 +48,7 @@ void HoldJoint(int index, double value, RobotDescription* robot) {
   const Joint joint = spec.joints[static_cast<size_t>(index)];
   if (joint.type == JointType::kBall)
     throw InputError(spec.source + ": joint " + Quote(joint.name) + ": a ball cannot be held");
-  const bool slides = joint.type == JointType::kPrismatic;
-  const Pose X_Pi =
-      joint.X_PB * CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q + (slides ? 0.0 : value),
-                                    joint.mdh.d + (slides ? value : 0.0));
+  const Pose X_Pi = CalcRowPose(joint, value);
   const auto weld = [&](int* carrier, Pose* X) {
     if (*carrier != index) return;
     *carrier = joint.parent;

@@ -284,8 +284,7 @@ class UrdfReader {
     for (const ImpossiblePart& part : impossible_) {
       const bool moves = part.joint >= 0 || robot_.spec.base.type != BaseType::kFixed;
       if (moves) {
-        const MassProperties& whole =
-            part.joint < 0 ? robot_.spec.base.body : robot_.spec.joints[static_cast<size_t>(part.joint)].body;
+        const MassProperties& whole = BodyOf(robot_.spec, part.joint);
         if (!FindUndefinedDynamics(whole).empty()) FailInertial(*part.link, part.problem);
         if (!FindPhysicalInconsistency(whole).empty()) continue;  // a note on bodies says so
       }

@@ -230,13 +230,13 @@ void TryMutant(const MutatedPair& pair, const MutationOptions& options, Mutant* 
   mutant->outcome = MutantOutcome::kKilled;
   if (!options.diagnose || !pair.reference) return;
   const FileCauses found = FindCauses(PrintExactly(changed), *pair.reference);
-  if (found.causes.empty()) return;
-  const CorrectionItem& first = found.corrections.items.front();
+  if (found.items.empty()) return;
+  const CorrectionItem& first = found.items.front();
   const auto names = [&](const CorrectionItem& item) {
     return IsNamedBy(changed.spec, mutant->number, item);
   };
-  mutant->named = found.causes.front().text;
-  mutant->explained = found.causes.front().explained;
+  mutant->named = first.text;
+  mutant->explained = first.explained;
   mutant->named_first = names(first);
   mutant->named_equal = std::ranges::any_of(first.rivals, names);
 }

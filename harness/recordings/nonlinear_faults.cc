@@ -228,15 +228,10 @@ void NonlinearFault::Undo(RecordedSample* sample) const {
   }
 }
 
-/// Returns where a joint at zero has its frame, in its parent's.
-static Pose CalcHome(const Joint& joint) {
-  return joint.X_PB * CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d);
-}
-
 void NonlinearFault::Undo(RobotSpec* robot) const {
   if (!IsOfModel()) return;
   Joint& moved = robot->joints[static_cast<size_t>(joint)];
-  const Pose home = CalcHome(moved);
+  const Pose home = CalcRowPose(moved);
   const Vector3d origin = home.translation();
   const Eigen::AngleAxisd turned(turn.norm(), turn.normalized());
   moved.X_PB =

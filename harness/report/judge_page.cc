@@ -45,13 +45,12 @@ class SkeletonText {
     for (int i = 0; i < model_.num_joints(); ++i) {
       const Joint& joint = model_.joint(i);
       if (joint.parent != parent) continue;
-      const Pose X = joint.X_PB * CalcMdhTransform(joint.mdh.alpha, joint.mdh.a, joint.mdh.q, joint.mdh.d);
       const Vector3d com = joint.body.com;
       text += fmt::format(
           "<body {}><joint name=\"{}\" type=\"{}\" axis=\"0 0 1\"/><inertial pos=\"{:.9g} {:.9g} {:.9g}\" "
           "mass=\"1\" diaginertia=\"1 1 1\"/>{}</body>",
-          ToText(X), i, joint.type == JointType::kPrismatic ? "slide" : "hinge", com.x(), com.y(), com.z(),
-          Children(i));
+          ToText(CalcRowPose(joint)), i, joint.type == JointType::kPrismatic ? "slide" : "hinge", com.x(),
+          com.y(), com.z(), Children(i));
     }
     return text;
   }

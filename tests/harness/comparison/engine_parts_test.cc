@@ -184,8 +184,8 @@ TEST_F(TwoMjcfs, MayHaveExchangedNamesOfLinks) {
   b = ReplaceOnce(b, "\"x\"", "\"fore\"");
   const Comparison exchanged = Compare(kArm, b);
   ASSERT_TRUE(exchanged.causes);
-  ASSERT_EQ(exchanged.causes->causes.size(), 1U) << List(exchanged);
-  EXPECT_EQ(exchanged.causes->causes[0].id, "exchange.link");
+  ASSERT_EQ(exchanged.causes->items.size(), 1U) << List(exchanged);
+  EXPECT_EQ(exchanged.causes->items[0].id, "exchange.link");
   EXPECT_TRUE(exchanged.causes->unexplained.empty());
 }
 

@@ -240,9 +240,9 @@ TEST(BallJoints, FaultsAreFound) {
   wrong.spec.joints[0].body.inertia *= 1000.0;
   wrong.parts.clear();
   const FileCauses found = FindCauses(PrintDescription(wrong), PrintDescription(mjcf));
-  ASSERT_EQ(found.causes.size(), 2U) << ::testing::PrintToString(ListLines(found));
+  ASSERT_EQ(found.items.size(), 2U) << ::testing::PrintToString(ListLines(found));
   std::set<std::string> ids;
-  for (const FileCause& cause : found.causes) {
+  for (const CorrectionItem& cause : found.items) {
     ids.insert(cause.id);
     EXPECT_EQ(cause.places, std::vector<std::string>{"link upper"});
   }

@@ -1,13 +1,12 @@
 // Other libraries' ways to write a floating base: terms are led back, by a route of the test's own, and a
 // side that speaks another convention than it says is recognised.
 
-#include "harness/descriptions/base_convention.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "controller/common/errors.h"
 #include "harness/comparison/consistency.h"
+#include "harness/descriptions/term_results.h"
 #include "harness/descriptions/urdf_reader.h"
 #include "harness/log/npy_file.h"
 #include "tests/common/evaluate_terms.h"
