@@ -13,10 +13,12 @@ namespace {
 using Kind = CorrectionKind;
 
 FileFault MakeWhole(Kind kind, bool in_second = false) {
-  FileFault fault{kind, SiteKind::kMass};
-  fault.whole = true;
-  fault.in_second = in_second;
-  return fault;
+  return {.kind = kind, .of = SiteKind::kMass, .in_second = in_second, .whole = true};
+}
+
+/// Conventions by the link's own origin.
+std::vector<LinkEdit> ListOwnEdits(const PrintedLink& link) {
+  return ListInertialEdits(link, {{link.origin.CalcPose()}});
 }
 
 /// Angles of roll, pitch or yaw of an inertial frame under which its inertia is right, by Gauss-Newton from
@@ -60,8 +62,8 @@ struct CandidateSearch::Part {
   bool is_fused;
   double extra;  ///< Bits of which of several.
   PrintedInertial given;
-  BodyNumbers right;  ///< What it would have to be alone, in its link's frame.
-  BodyNumbers open;   ///< Tolerances that the digits of both files give them.
+  MassProperties right;  ///< What it would have to be alone, in its link's frame.
+  MassProperties open;   ///< Tolerances that the digits of both files give them.
   SiteMask wrong = 0;
   EditFrames frames;
 
@@ -90,14 +92,14 @@ std::optional<CandidateSearch::Part> CandidateSearch::MakePart(int link, int k) 
   part.extra = part.is_fused ? std::log2(static_cast<double>(node.parts.size())) + 1.0 : 0.0;
   part.given = *pair_.a().link(k).inertial;
   part.open = pair_.given(link).body_tolerance;
-  AddChange(BodyNumbers{}, right.body_tolerance, &part.open);
+  AddChange(MassProperties{}, right.body_tolerance, &part.open);
   part.right = right.body;
   if (part.is_fused) {
     Node rest = node;
     std::erase(rest.parts, k);
-    const std::optional<BodyNumbers> alone = Subtract(right.body, CalcNodeBody(pair_.a(), rest));
+    const std::optional<MassProperties> alone = Subtract(right.body, CalcNodeBody(pair_.a(), rest));
     if (!alone) return std::nullopt;
-    part.right = Express(*alone, CalcPartPose(pair_.a(), node, k).inverse());
+    part.right = ExpressIn(*alone, CalcPartPose(pair_.a(), node, k).inverse());
     part.open.com *= right.body.mass / alone->mass;
     part.open.com.setConstant(part.open.com.maxCoeff());
     part.open.inertia.setConstant(part.open.inertia.maxCoeff());
@@ -170,11 +172,10 @@ void CandidateSearch::SearchPart(const Part& part) {
     Try(trial, part.link, edit.undo);
   }
   const Vector3d& given = part.given.origin.t;
-  const BodyNumbers right = part.right;
+  const MassProperties right = part.right;
   if (part.IsWrong(SiteKind::kMass)) {
-    EditTrial number =
-        part.Make({Kind::kNumber, SiteKind::kMass}, CountBits(right.mass, part.open.mass),
-                  fmt::format("{:.6g} here, {:.6g} in the other file", part.given.mass.value, right.mass));
+    EditTrial number = part.Make({Kind::kNumber, SiteKind::kMass}, CountBits(right.mass, part.open.mass),
+                                 DescribeRight(part.given.mass.value, right.mass));
     const auto take = [m = PrintedScalar{right.mass, part.open.mass}](PrintedLink* made) {
       made->inertial->mass = m;
     };
@@ -204,11 +205,10 @@ void CandidateSearch::SearchPart(const Part& part) {
   if (part.IsWrong(SiteKind::kInertia)) SearchInertiaNumbers(part);
   if (!part.is_fused || part.link != part.node) return;
   constexpr double kTenNumbers = 90.0;
-  EditTrial number = part.Make(
-      MakeWhole(Kind::kNumber), kTenNumbers - part.extra,
-      fmt::format(
-          "mass {:.6g} here, {:.6g} in the other file; centre of mass ({}) here, ({}) in the other file",
-          part.given.mass.value, right.mass, ShowVector(given), ShowVector(right.com)));
+  EditTrial number =
+      part.Make(MakeWhole(Kind::kNumber), kTenNumbers - part.extra,
+                fmt::format("mass {}; centre of mass {}", DescribeRight(part.given.mass.value, right.mass),
+                            DescribeRight(given, right.com)));
   Try(number, part.link, GiveBody(right));
 }
 
@@ -258,8 +258,8 @@ void CandidateSearch::SearchInertiaNumbers(const Part& part) {
       constexpr double kHalf = 1e-4;
       Try(part.Make({Kind::kFrame, SiteKind::kInertia, k},
                     1.0 + CountBits(std::abs(angle) > kHalf ? angle : 0.0, kHalf),
-                    fmt::format("{} of the inertial frame {:.6g} here, {:.6g} in the other file",
-                                kAngleNames[k], part.given.origin.r[k], angle)),
+                    fmt::format("{} of the inertial frame {}", kAngleNames[k],
+                                DescribeRight(part.given.origin.r[k], angle))),
           part.link, [k, angle](PrintedLink* made) { made->inertial->origin.r[k] = angle; });
     }
   }
@@ -268,8 +268,7 @@ void CandidateSearch::SearchInertiaNumbers(const Part& part) {
 /// One convention of all parts of a body.
 void CandidateSearch::SearchAllParts(int link) {
   std::vector<LinkEdits> lists;
-  for (const int part : pair_.node(link).parts)
-    lists.push_back({part, ListInertialEdits(pair_.a().link(part), {true})});
+  for (const int part : pair_.node(link).parts) lists.push_back({part, ListOwnEdits(pair_.a().link(part))});
   TryTogether(lists, link, kBodyMask, true);
 }
 
@@ -287,7 +286,7 @@ void CandidateSearch::SearchTwoParts(int link, size_t begin) {
   PrintedRobot& robot = *pair_.mutable_a();
   for (const int first : node.parts) {
     const PrintedLink before = robot.link(first);
-    for (const LinkEdit& edit : ListInertialEdits(before, {true})) {
+    for (const LinkEdit& edit : ListOwnEdits(before)) {
       robot.link(first) = Carry(before, edit.undo);
       for (const int second : node.parts) {
         const std::optional<Part> part = MakePart(link, second);
@@ -314,9 +313,9 @@ void CandidateSearch::SearchTwoParts(int link, size_t begin) {
 void CandidateSearch::SearchLoad(int link) {
   // The ten numbers: a mass and a centre that are wrong by themselves make no such body.
   constexpr double kBits = 60.0;
-  const BodyNumbers& given = pair_.given(link).body;
-  const std::optional<BodyNumbers> load = Subtract(pair_.right(link).body, given);
-  const BodyNumbers& open = pair_.given(link).body_tolerance;
+  const MassProperties& given = pair_.given(link).body;
+  const std::optional<MassProperties> load = Subtract(pair_.right(link).body, given);
+  const MassProperties& open = pair_.given(link).body_tolerance;
   if (!load || !IsWrong(link, SiteKind::kCom) || load->mass < 10.0 * open.mass) return;
   if (!FindPhysicalInconsistency({load->mass, load->com, 0.5 * (load->inertia + load->inertia.transpose())})
            .empty())
@@ -331,9 +330,10 @@ void CandidateSearch::SearchLostParts(int link) {
   const Node& theirs = pair_.node_b(pair_.Partner(link));
   const Node& ours = pair_.node(link);
   const GivenNode& given = pair_.given(link);
-  const auto add = [&](const PrintedRobot& robot, int part, bool is_second, const BodyNumbers& body) {
-    for (const SiteKind kind : {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) {
-      if (!(pair_.CompareNode(kind, link, given.X, given.pose, body, given.body_tolerance) <= 1.0)) return;
+  const auto add = [&](const PrintedRobot& robot, int part, bool is_second, const MassProperties& body) {
+    const GivenNode without = {given.X, given.pose, body, given.body_tolerance};
+    for (const SiteKind kind : kBodyKinds) {
+      if (!(pair_.CompareNode(kind, link, without) <= 1.0)) return;
     }
     Add({MakeWhole(Kind::kPartMissing, is_second), 3.0, kBodyMask, robot.link(part).name}, link,
         ListBodySites(link));
@@ -343,8 +343,8 @@ void CandidateSearch::SearchLostParts(int link) {
     Node rest = theirs;
     std::erase(rest.parts, part);
     // The second file's body without the part, against this file's.
-    const BodyNumbers body = Express(CalcNodeBody(pair_.b(), rest), pair_.X_ab(link));
-    const BodyNumbers& right = pair_.right(link).body;
+    const MassProperties body = ExpressIn(CalcNodeBody(pair_.b(), rest), pair_.X_ab(link));
+    const MassProperties& right = pair_.right(link).body;
     add(pair_.b(), part, false,
         {right.mass + given.body.mass - body.mass, right.com + given.body.com - body.com,
          right.inertia + given.body.inertia - body.inertia});

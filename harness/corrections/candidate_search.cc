@@ -11,8 +11,6 @@
 namespace dexcheck {
 namespace {
 
-constexpr SiteKind kNodeKinds[] = {SiteKind::kPosition, SiteKind::kRotation, SiteKind::kMass, SiteKind::kCom,
-                                   SiteKind::kInertia};
 /// Relative to the tolerances of the file as it is: what is farther off is right only if little of it is
 /// left.
 constexpr double kFar = 100.0;
@@ -92,8 +90,7 @@ bool CandidateSearch::Try(const EditTrial& trial, int place, const std::vector<P
           continue;
         const bool is_wrong = IsWrong(tried.link, kind);
         const double was = pair_.CompareNode(kind, tried.link);
-        const double ratio =
-            pair_.CompareNode(kind, tried.link, now.X, now.pose, now.body, now.body_tolerance);
+        const double ratio = pair_.CompareNode(kind, tried.link, now);
         const bool holds = is_close ? (is_wrong ? CountLeft(ratio, was).has_value() : ratio <= 1.0)
                                     : ratio < kFar || ratio < 0.05 * was;
         if (!holds && (!is_wrong || trial.needs_all)) return false;
@@ -154,7 +151,7 @@ void CandidateSearch::AddSimple(const EditTrial& trial, int link, const LinkUndo
 
 std::vector<Site> CandidateSearch::ListBodySites(int link) const {
   std::vector<Site> sites;
-  for (const SiteKind kind : {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) {
+  for (const SiteKind kind : kBodyKinds) {
     if (IsWrong(link, kind)) sites.push_back({kind, link});
   }
   return sites;
@@ -178,14 +175,15 @@ std::vector<CorrectionCandidate> CandidateSearch::Run() {
 }
 
 FileFault MakeLostAxes(const PrintedInertial& inertial, bool in_second) {
-  FileFault fault{CorrectionKind::kNoAxes, SiteKind::kInertia, inertial.I.tail<3>().isZero() ? 0 : 1};
-  fault.in_second = in_second;
-  return fault;
+  return {.kind = CorrectionKind::kNoAxes,
+          .of = SiteKind::kInertia,
+          .component = inertial.I.tail<3>().isZero() ? 0 : 1,
+          .in_second = in_second};
 }
 
-std::optional<BodyNumbers> Subtract(const BodyNumbers& whole, const BodyNumbers& rest) {
+std::optional<MassProperties> Subtract(const MassProperties& whole, const MassProperties& rest) {
   constexpr double kLeastMass = 1e-9;
-  BodyNumbers part;
+  MassProperties part;
   part.mass = whole.mass - rest.mass;
   if (part.mass <= kLeastMass) return std::nullopt;
   part.com = (whole.mass * whole.com - rest.mass * rest.com) / part.mass;
@@ -194,7 +192,7 @@ std::optional<BodyNumbers> Subtract(const BodyNumbers& whole, const BodyNumbers&
   return part;
 }
 
-LinkUndo GiveBody(const BodyNumbers& body) {
+LinkUndo GiveBody(const MassProperties& body) {
   return [body](PrintedLink* made) {
     if (!made->inertial) made->inertial.emplace();
     const Matrix3d R = made->inertial->origin.CalcRotation();
@@ -202,10 +200,6 @@ LinkUndo GiveBody(const BodyNumbers& body) {
     made->inertial->origin.t = body.com;
     made->inertial->I = ToEntries(R.transpose() * body.inertia * R);
   };
-}
-
-BodyNumbers Express(const BodyNumbers& body, const Pose& X) {
-  return {body.mass, X * body.com, X.linear() * body.inertia * X.linear().transpose()};
 }
 
 namespace {
@@ -227,12 +221,24 @@ double ShowZero(double right, double open) { return std::abs(right) <= open ? 0.
 
 }  // namespace
 
+std::string DescribeRight(const std::string& given, const std::string& right) {
+  return fmt::format("{} here, {} in the other file", given, right);
+}
+
+std::string DescribeRight(double given, double right) {
+  return DescribeRight(fmt::format("{:.6g}", given), fmt::format("{:.6g}", right));
+}
+
+std::string DescribeRight(const Vector3d& given, const Vector3d& right) {
+  return DescribeRight("(" + ShowVector(given) + ")", "(" + ShowVector(right) + ")");
+}
+
 std::string DescribeEntries(std::span<const char* const> names, const double* given, const double* right,
                             const double* open) {
   std::string text;
   for (const size_t k : ListDiffering(names.size(), given, right, open))
-    text += fmt::format("{}{} {:.6g} here, {:.6g} in the other file", text.empty() ? "" : "; ", names[k],
-                        given[k], ShowZero(right[k], open[k]));
+    text += fmt::format("{}{} {}", text.empty() ? "" : "; ", names[k],
+                        DescribeRight(given[k], ShowZero(right[k], open[k])));
   return text;
 }
 

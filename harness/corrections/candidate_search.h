@@ -111,6 +111,10 @@ class CandidateSearch {
 /// nothing.
 std::optional<double> CountLeft(double after, double before);
 
+/// "0.1 here, 0.2 in the other file"
+std::string DescribeRight(const std::string& given, const std::string& right);
+std::string DescribeRight(double given, double right);
+std::string DescribeRight(const Vector3d& given, const Vector3d& right);
 /// "x 0.1 here, 0.2 in the other file" of each entry that differs by more than the tolerance.
 std::string DescribeEntries(std::span<const char* const> names, const double* given, const double* right,
                             const double* open);
@@ -126,9 +130,8 @@ inline constexpr const char* kInertiaNames[] = {"ixx", "iyy", "izz", "ixy", "ixz
 FileFault MakeLostAxes(const PrintedInertial& inertial, bool in_second);
 
 /// A body without others of its parts; none where no mass is left.
-std::optional<BodyNumbers> Subtract(const BodyNumbers& whole, const BodyNumbers& rest);
-BodyNumbers Express(const BodyNumbers& body, const Pose& X);
+std::optional<MassProperties> Subtract(const MassProperties& whole, const MassProperties& rest);
 /// Gives a link's inertial the numbers of a body, along the axes that it has.
-LinkUndo GiveBody(const BodyNumbers& body);
+LinkUndo GiveBody(const MassProperties& body);
 
 }  // namespace dexcheck

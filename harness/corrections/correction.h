@@ -42,6 +42,9 @@ enum class SiteKind {
   kConstraint,  ///< A constraint or spring between links.
   kMotor,       ///< The joints that motors drive, and gains of servos.
 };
+inline constexpr SiteKind kBodyKinds[] = {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia};
+inline constexpr SiteKind kNodeKinds[] = {SiteKind::kPosition, SiteKind::kRotation, SiteKind::kMass,
+                                          SiteKind::kCom, SiteKind::kInertia};
 inline bool IsOfBody(SiteKind kind) { return kind >= SiteKind::kMass && kind <= SiteKind::kInertia; }
 inline bool IsName(SiteKind kind) { return kind == SiteKind::kName || kind == SiteKind::kLinkName; }
 inline bool IsOfPose(SiteKind kind) { return kind == SiteKind::kPosition || kind == SiteKind::kRotation; }

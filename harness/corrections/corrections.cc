@@ -32,13 +32,11 @@ void Merge(PrintedLink before, PrintedLink right, PrintedLink* link) {
     }
   };
   const auto merge_origin = [&](PrintedOrigin* from, PrintedOrigin* to, PrintedOrigin* merged) {
-    const bool is_turned = from->r != to->r || from->form != to->form || from->sequence != to->sequence;
     merge(from, to, merged);
-    if (!is_turned) return;
-    const Vector3d t = merged->t, half_t = merged->half_t;
-    *merged = *to;
-    merged->t = t;
-    merged->half_t = half_t;
+    if (!IsTurned(*from, *to)) return;
+    PrintedOrigin turned = *to;
+    turned.TakePlace(*merged);
+    *merged = turned;
   };
   merge_origin(&before.origin, &right.origin, &link->origin);
   if (!before.inertial || !right.inertial || !link->inertial) {
@@ -161,7 +159,7 @@ class OneWay {
       left_.clear();
       if (sites.empty()) break;
       for (const Site& site : sites) {
-        if (std::ranges::find(all, site) == all.end()) all.push_back(site);
+        if (!Contains(all, site)) all.push_back(site);
       }
       const std::vector<CorrectionCandidate> candidates =
           CandidateSearch(&pair_, sites, is_second_, budget_).Run();
@@ -201,7 +199,7 @@ class OneWay {
       item.explained = static_cast<double>(item.sites.size()) / static_cast<double>(all.size());
     constexpr double kUnexplained = 60.0;
     result.bits += kUnexplained * static_cast<double>(result.unexplained.size());
-    result.unexplained.insert(result.unexplained.end(), unexplained.begin(), unexplained.end());
+    Append(unexplained, &result.unexplained);
     return result;
   }
 
@@ -256,7 +254,7 @@ class OneWay {
         continue;
       }
       const std::string text = item.places[0] + ": " + NameSite(item.fault.of);
-      if (std::ranges::find(*unexplained, text) == unexplained->end()) unexplained->push_back(text);
+      if (!Contains(*unexplained, text)) unexplained->push_back(text);
     }
     result->items = std::move(kept);
   }
@@ -268,8 +266,8 @@ class OneWay {
   /// Whether a site was put right and still is, as far as its correction left it.
   [[nodiscard]] bool IsSettled(const Site& site) const {
     constexpr double kMore = 2.0;
-    const auto settled = std::ranges::find(settled_, site, &SettledSite::site);
-    if (settled == settled_.end()) return false;
+    const SettledSite* const settled = FindIn(settled_, site, &SettledSite::site);
+    if (settled == nullptr) return false;
     if (!IsOfBody(site.kind) && !IsOfPose(site.kind)) return true;
     return settled->rest == 0.0 || pair_.CompareNode(site.kind, site.link) <= kMore * settled->rest;
   }
@@ -300,13 +298,12 @@ class OneWay {
       for (size_t k = 0; k < (is_one ? 1 : candidate.patches.size()); ++k) {
         const int link = is_one ? candidate.link : candidate.patches[k].link;
         std::string place = NamePlace(pair_, link, candidate.fault.of, candidate.fault.in_second);
-        if (std::ranges::find(item.places, place) != item.places.end()) continue;
+        if (Contains(item.places, place)) continue;
         item.places.push_back(std::move(place));
         item.values.push_back(candidate.values);
       }
       // A patch of this file would copy the other one's fault.
-      if (!candidate.fault.in_second)
-        item.patches.insert(item.patches.end(), candidate.patches.begin(), candidate.patches.end());
+      if (!candidate.fault.in_second) Append(candidate.patches, &item.patches);
     }
     const CorrectionCandidate& first = candidates[deal.candidates[0]];
     item.in_second = is_second_ != item.fault.in_second;
@@ -340,13 +337,13 @@ class OneWay {
       return;
     }
     for (size_t k = 0; k < item.places.size(); ++k) {
-      if (std::ranges::find(same->places, item.places[k]) != same->places.end()) continue;
+      if (Contains(same->places, item.places[k])) continue;
       same->places.push_back(item.places[k]);
       same->values.push_back(item.values[k]);
     }
     same->bits += item.bits;
-    same->sites.insert(same->sites.end(), item.sites.begin(), item.sites.end());
-    same->patches.insert(same->patches.end(), item.patches.begin(), item.patches.end());
+    Append(item.sites, &same->sites);
+    Append(item.patches, &same->patches);
   }
 
   void AddRivals(const ChosenDeal& chosen, const std::vector<Site>& sites,
@@ -360,7 +357,7 @@ class OneWay {
       if (deal.candidates.size() < chosen.deal.candidates.size() && IsSameFault(rival.fault, item->fault))
         continue;
       std::string text = describe(rival);
-      if (std::ranges::find(texts, text) != texts.end()) continue;
+      if (Contains(texts, text)) continue;
       texts.push_back(std::move(text));
       item->rivals.push_back(std::move(rival));
     }
@@ -470,7 +467,7 @@ std::string DescribeItem(const CorrectionItem& item, const std::string& file) {
   constexpr size_t kShown = 3;
   std::vector<std::string> values;
   for (const std::string& value : item.values) {
-    if (!value.empty() && std::ranges::find(values, value) == values.end()) values.push_back(value);
+    if (!value.empty() && !Contains(values, value)) values.push_back(value);
   }
   if (values.empty() || values.size() > kShown) return text;
   const bool is_name = item.fault.kind == CorrectionKind::kOfOther ||

@@ -23,8 +23,8 @@ class CoverFinder {
     for (const CorrectionCandidate& candidate : candidates) {
       std::vector<size_t>& put_right = put_right_.emplace_back();
       for (const Site& site : candidate.sites) {
-        const auto found = std::ranges::find(sites, site);
-        if (found != sites.end()) put_right.push_back(static_cast<size_t>(found - sites.begin()));
+        const int found = IndexOf(sites, site);
+        if (found >= 0) put_right.push_back(static_cast<size_t>(found));
       }
       std::ranges::sort(put_right);
     }
@@ -39,7 +39,7 @@ class CoverFinder {
   Cover Run() {
     Cover cover;
     const std::vector<Deal> all = ListDeals();
-    while (std::ranges::find(is_left_, true) != is_left_.end()) {
+    while (Contains(is_left_, true)) {
       const std::vector<Deal> deals = ListDeals();
       if (deals.empty()) break;
       size_t best = 0;
@@ -166,7 +166,7 @@ class CoverFinder {
       for (const auto& [place, c] : by_place) {
         deal.candidates.push_back(c);
         for (const size_t site : ListLeft(c)) {
-          if (std::ranges::find(deal.sites, site) == deal.sites.end()) deal.sites.push_back(site);
+          if (!Contains(deal.sites, site)) deal.sites.push_back(site);
         }
         sum += candidates_[c].bits;
         largest = std::max(largest, candidates_[c].bits);

@@ -124,10 +124,9 @@ std::vector<LinkEdit> ListRowEdits(const PrintedOrigin& origin) {
   for (int k = 0; k < 4; ++k) {
     if (*number(&row, k) == 0.0) continue;
     const auto scale = [&](Kind kind, int component, double bits, double factor) {
-      edits.push_back({{kind, SiteKind::kPosition, component}, bits, [=](PrintedLink* link) {
-                         *number(&link->origin, k) *= factor;
-                       }});
-      edits.back().fault.whole = true;
+      edits.push_back({{.kind = kind, .of = SiteKind::kPosition, .component = component, .whole = true},
+                       bits,
+                       [=](PrintedLink* link) { *number(&link->origin, k) *= factor; }});
     };
     scale(Kind::kSignOf, k, 0.0, -1.0);
     if (k % 2 != 0) scale(Kind::kUnit, 0, 1.0, 1e-3);
@@ -139,22 +138,20 @@ std::vector<LinkEdit> ListRowEdits(const PrintedOrigin& origin) {
   return edits;
 }
 
+Pose MakeTurn(const Matrix3d& R) {
+  Pose X = Pose::Identity();
+  X.linear() = R;
+  return X;
+}
+
 /// Collects the edits of one inertial.
 class InertialEdits {
  public:
   InertialEdits(const PrintedLink& link, const EditFrames& frames)
       : given_(*link.inertial), frames_(frames), R_(given_.origin.CalcRotation()) {
-    const auto is_turned = [](const Pose& X) { return !X.linear().isIdentity(1e-9); };
-    if (frames.is_own)
-      origins_.push_back(
-          {[](const PrintedLink& l) { return l.origin.CalcPose(); }, is_turned(link.origin.CalcPose())});
-    for (const Pose& X : frames.X_PL)
-      origins_.push_back({[X](const PrintedLink&) { return X; }, is_turned(X)});
-    if (link.compiled) {
-      Add({Kind::kCompiled, SiteKind::kMass}, 0.0,
-          [stated = link.compiled->stated](PrintedInertial* body, const PrintedLink&) { *body = stated; });
-      edits_.back().fault.whole = true;
-    }
+    if (link.compiled)
+      Add({.kind = Kind::kCompiled, .of = SiteKind::kMass, .whole = true}, 0.0,
+          [stated = link.compiled->stated](Body* body) { *body = stated; });
   }
 
   std::vector<LinkEdit> Run() {
@@ -168,104 +165,72 @@ class InertialEdits {
 
  private:
   using Body = PrintedInertial;
-  using FindPose = std::function<Pose(const PrintedLink&)>;
-  /// The link in its parent's frame.
-  struct Origin {
-    FindPose find;
-    bool is_turned;
-  };
 
   template <typename Change>
   void Add(const FileFault& fault, double bits, const Change& change) {
-    edits_.push_back({fault, bits, [change](PrintedLink* link) { change(&*link->inertial, *link); }});
+    edits_.push_back({fault, bits, [change](PrintedLink* link) { change(&*link->inertial); }});
   }
 
   void ListMasses() {
     const std::span<const UnitFault> units = ListUnits(SiteKind::kMass);
     for (size_t k = 0; k < units.size(); ++k) {
       Add({Kind::kUnit, SiteKind::kMass, static_cast<int>(k)}, 0.0,
-          [f = units[k].factor](Body* body, const PrintedLink&) { body->mass.value *= f; });
+          [f = units[k].factor](Body* body) { body->mass.value *= f; });
     }
   }
 
   void ListCentres() {
     ListVectorEdits(SiteKind::kCom, given_.origin.t, [&](Kind kind, int component, const Matrix3d& M) {
       Add({kind, SiteKind::kCom, component}, 0.0,
-          [M](Body* body, const PrintedLink&) { body->origin.t = (M * body->origin.t).eval(); });
+          [M](Body* body) { body->origin.t = (M * body->origin.t).eval(); });
     });
-    const auto move = [&](Kind kind, double bits, const FindPose& find, bool inverse) {
-      Add({kind, SiteKind::kCom}, bits, [find, inverse](Body* body, const PrintedLink& link) {
-        const Pose X = find(link);
-        body->origin.t = (inverse ? X.inverse() : X) * body->origin.t;
-      });
+    const auto move = [&](Kind kind, double bits, const Pose& X) {
+      Add({kind, SiteKind::kCom}, bits, [X](Body* body) { body->origin.t = X * body->origin.t; });
     };
-    for (const auto& [find, is_turned] : origins_) {
-      move(Kind::kInParent, 1.0, find, true);
-      move(Kind::kToParent, 1.0, find, false);
-      if (!is_turned) continue;
-      const auto turn = [find = find](const PrintedLink& link) {
-        Pose X = find(link);
-        X.translation().setZero();
-        return X;
-      };
-      const auto shift = [find = find](const PrintedLink& link) {
-        Pose X = find(link);
-        X.linear().setIdentity();
-        return X;
-      };
-      move(Kind::kAlongParent, 1.0, turn, true);
-      move(Kind::kAlongToParent, 1.0, turn, false);
-      move(Kind::kPlaceAdded, 1.0, shift, true);
-      move(Kind::kPlaceTaken, 1.0, shift, false);
+    for (const Pose& X : frames_.X_PL) {
+      move(Kind::kInParent, 1.0, X.inverse());
+      move(Kind::kToParent, 1.0, X);
+      if (X.linear().isIdentity(1e-9)) continue;
+      const Pose shift(Eigen::Translation3d(X.translation()));
+      move(Kind::kAlongParent, 1.0, MakeTurn(X.linear().transpose()));
+      move(Kind::kAlongToParent, 1.0, MakeTurn(X.linear()));
+      move(Kind::kPlaceAdded, 1.0, shift.inverse());
+      move(Kind::kPlaceTaken, 1.0, shift);
     }
-    for (const Pose& X_LC : frames_.X_LC)
-      move(
-          Kind::kInChild, 2.0, [X_LC](const PrintedLink&) { return X_LC; }, false);
+    for (const Pose& X_LC : frames_.X_LC) move(Kind::kInChild, 2.0, X_LC);
     if (R_.isIdentity(1e-9)) return;
     for (const bool to : {false, true}) {
-      Add({to ? Kind::kToInertialAxes : Kind::kInertialAxes, SiteKind::kCom}, 2.0,
-          [to](Body* body, const PrintedLink&) {
-            const Matrix3d R = body->origin.CalcRotation();
-            body->origin.t = ((to ? Matrix3d(R.transpose()) : R) * body->origin.t).eval();
-          });
+      Add({to ? Kind::kToInertialAxes : Kind::kInertialAxes, SiteKind::kCom}, 2.0, [to](Body* body) {
+        const Matrix3d R = body->origin.CalcRotation();
+        body->origin.t = ((to ? Matrix3d(R.transpose()) : R) * body->origin.t).eval();
+      });
     }
   }
 
   /// The centre of mass and the inertia at once.
   void ListFrames() {
-    const auto move = [&](Kind kind, int component, double bits, const FindPose& find) {
-      FileFault fault{kind, SiteKind::kCom, component};
-      fault.whole = true;
-      Add(fault, bits, [find](Body* body, const PrintedLink& link) {
-        const Pose X = find(link);
+    const auto move = [&](Kind kind, int component, double bits, const Pose& X) {
+      Add({.kind = kind, .of = SiteKind::kCom, .component = component, .whole = true}, bits, [X](Body* body) {
         const Matrix3d R = body->origin.CalcRotation();
         const Matrix3d Q = R.transpose() * X.linear() * R;
         body->I = ToEntries(Q * ToTensor(body->I) * Q.transpose());
-        body->origin.t = (X.linear() * body->origin.t + X.translation()).eval();
+        body->origin.t = X * body->origin.t;
       });
     };
-    for (int k = 0; k < 3; ++k) {
-      Pose mirror = Pose::Identity();
-      mirror.linear() = MakeMirror(k);
-      move(Kind::kMirror, k, 0.0, [mirror](const PrintedLink&) { return mirror; });
-    }
-    for (const Origin& origin : origins_) {
-      move(Kind::kInParent, 0, 1.0, [find = origin.find](const PrintedLink& l) { return find(l).inverse(); });
-      move(Kind::kAlongParent, 0, 1.0, [find = origin.find](const PrintedLink& l) {
-        Pose turn = Pose::Identity();
-        turn.linear() = find(l).linear().transpose();
-        return turn;
-      });
+    for (int k = 0; k < 3; ++k) move(Kind::kMirror, k, 0.0, MakeTurn(MakeMirror(k)));
+    for (const Pose& X : frames_.X_PL) {
+      move(Kind::kInParent, 0, 1.0, X.inverse());
+      move(Kind::kAlongParent, 0, 1.0, MakeTurn(X.linear().transpose()));
     }
   }
 
   /// An edit of the tensor along the link's axes.
   template <typename Calc>
   void AddTensor(Kind kind, int component, double bits, const Calc& calc) {
-    Add({kind, SiteKind::kInertia, component}, bits, [calc](Body* body, const PrintedLink& link) {
+    Add({kind, SiteKind::kInertia, component}, bits, [calc](Body* body) {
       const Matrix3d R = body->origin.CalcRotation();
       const Matrix3d I = R * ToTensor(body->I) * R.transpose();
-      body->I = ToEntries(R.transpose() * calc(*body, I, link) * R);
+      body->I = ToEntries(R.transpose() * calc(*body, I) * R);
     });
   }
 
@@ -273,62 +238,51 @@ class InertialEdits {
     // The mass and centre as given, and as right.
     for (const bool as_right : {false, true}) {
       if (as_right && !frames_.right) continue;
-      const auto shift = [&](Kind kind, double bits, double sign, const FindPose& find) {
+      const auto shift = [&](Kind kind, double bits, double sign, const Pose& X) {
         const std::pair<double, Vector3d> right = frames_.right.value_or(std::pair(0.0, Vector3d::Zero()));
-        AddTensor(kind, 0, bits, [=](const Body& body, const Matrix3d& I, const PrintedLink& link) {
-          const Pose X = find(link);
+        AddTensor(kind, 0, bits, [=](const Body& body, const Matrix3d& I) {
           const double mass = as_right ? right.first : body.mass.value;
           const Matrix3d moved = CalcPointInertia(mass, X * (as_right ? right.second : body.origin.t));
           return Matrix3d(I + sign * (X.linear().transpose() * moved * X.linear()));
         });
       };
-      const auto none = [](const PrintedLink&) { return Pose(Pose::Identity()); };
-      shift(Kind::kAboutOrigin, 0.0, -1.0, none);
+      shift(Kind::kAboutOrigin, 0.0, -1.0, Pose::Identity());
       // Numbers that a body can have are more often right, and the other file's about the origin.
       constexpr double kPossible = 6.0;
       const bool is_possible = FindPhysicalInconsistency({given_.mass.value, given_.origin.t,
                                                           R_ * ToTensor(given_.I) * R_.transpose()})
                                    .empty();
-      shift(Kind::kMovedTwice, is_possible ? kPossible : 0.0, 1.0, none);
-      for (const Origin& origin : origins_) shift(Kind::kAboutParent, 1.0, -1.0, origin.find);
+      shift(Kind::kMovedTwice, is_possible ? kPossible : 0.0, 1.0, Pose::Identity());
+      for (const Pose& X : frames_.X_PL) shift(Kind::kAboutParent, 1.0, -1.0, X);
     }
-    const auto turn = [&](Kind kind, int component, double bits, const auto& find) {
-      AddTensor(kind, component, bits, [find](const Body&, const Matrix3d& I, const PrintedLink& link) {
-        const Matrix3d M = find(link);
-        return Matrix3d(M * I * M.transpose());
-      });
+    const auto turn = [&](Kind kind, int component, double bits, const Matrix3d& M) {
+      AddTensor(kind, component, bits,
+                [M](const Body&, const Matrix3d& I) { return Matrix3d(M * I * M.transpose()); });
     };
-    for (const Origin& origin : origins_) {
-      if (!origin.is_turned) continue;
-      turn(Kind::kAlongParent, 0, 0.0,
-           [find = origin.find](const PrintedLink& l) { return Matrix3d(find(l).linear().transpose()); });
-      turn(Kind::kAlongToParent, 0, 1.0,
-           [find = origin.find](const PrintedLink& l) { return Matrix3d(find(l).linear()); });
+    for (const Pose& X : frames_.X_PL) {
+      if (X.linear().isIdentity(1e-9)) continue;
+      turn(Kind::kAlongParent, 0, 0.0, X.linear().transpose());
+      turn(Kind::kAlongToParent, 0, 1.0, X.linear());
     }
-    for (int k = 0; k < 3; ++k)
-      turn(Kind::kMirror, k, 1.0, [M = MakeMirror(k)](const PrintedLink&) { return M; });
+    for (int k = 0; k < 3; ++k) turn(Kind::kMirror, k, 1.0, MakeMirror(k));
     if (R_.isIdentity(1e-9)) return;
-    AddTensor(Kind::kLinkAxes, 0, 0.0,
-              [](const Body& body, const Matrix3d&, const PrintedLink&) { return ToTensor(body.I); });
-    AddTensor(Kind::kAboutOriginAxes, 0, 1.0, [](const Body& body, const Matrix3d& I, const PrintedLink&) {
+    AddTensor(Kind::kLinkAxes, 0, 0.0, [](const Body& body, const Matrix3d&) { return ToTensor(body.I); });
+    AddTensor(Kind::kAboutOriginAxes, 0, 1.0, [](const Body& body, const Matrix3d& I) {
       const Matrix3d R = body.origin.CalcRotation();
       const Matrix3d offset = CalcPointInertia(body.mass.value, R.transpose() * body.origin.t);
       return Matrix3d(I - R * offset * R.transpose());
     });
     for (const OriginEdit& edit : ListTurns(given_.origin)) {
       if (edit.kind == Kind::kTurnParent || edit.kind == Kind::kMirror) continue;
-      FileFault fault{Kind::kFrame, SiteKind::kInertia, edit.component};
-      fault.rotation = edit.kind;
-      Add(fault, edit.bits + 1.0,
-          [undo = edit.undo](Body* body, const PrintedLink&) { undo(&body->origin); });
+      Add({Kind::kFrame, SiteKind::kInertia, edit.component, edit.kind}, edit.bits + 1.0,
+          [undo = edit.undo](Body* body) { undo(&body->origin); });
     }
   }
 
   /// Edits of the six numbers as printed.
   void ListEntries() {
     const auto entries = [&](Kind kind, int component, double bits, const auto& calc) {
-      Add({kind, SiteKind::kInertia, component}, bits,
-          [calc](Body* body, const PrintedLink&) { body->I = calc(body->I); });
+      Add({kind, SiteKind::kInertia, component}, bits, [calc](Body* body) { body->I = calc(body->I); });
     };
     const auto scale = [&](Kind kind, int component, double bits, const Vector6d& factors) {
       entries(kind, component, bits, [factors](const Vector6d& I) { return I.cwiseProduct(factors).eval(); });
@@ -370,7 +324,6 @@ class InertialEdits {
   const PrintedInertial& given_;
   const EditFrames& frames_;
   Matrix3d R_;
-  std::vector<Origin> origins_;
   std::vector<LinkEdit> edits_;
 };
 
@@ -396,10 +349,9 @@ std::vector<LinkEdit> ListOriginEdits(const PrintedOrigin& origin, const EditFra
   if (origin.form == RotationForm::kMdh) return ListRowEdits(origin);
   std::vector<LinkEdit> edits = ListRotationEdits(origin);
   const auto add = [&](Kind kind, int component, double bits, bool whole, const auto& change) {
-    edits.push_back({{kind, SiteKind::kPosition, component}, bits, [change](PrintedLink* link) {
-                       change(&link->origin);
-                     }});
-    edits.back().fault.whole = whole;
+    edits.push_back({{.kind = kind, .of = SiteKind::kPosition, .component = component, .whole = whole},
+                     bits,
+                     [change](PrintedLink* link) { change(&link->origin); }});
   };
   const auto turn = [&](Kind kind, int component, double bits, const Matrix3d& M) {
     add(kind, component, bits, false, [M](PrintedOrigin* o) { o->t = (M * o->t).eval(); });
@@ -444,8 +396,7 @@ PrintedLink Carry(const PrintedLink& link, const LinkUndo& undo) {
   const auto list = [](PrintedLink* of) {
     std::vector<LinkNumber> numbers = ListNumbers(&of->origin);
     if (!of->inertial) return numbers;
-    const std::vector<LinkNumber> more = ListNumbers(&*of->inertial);
-    numbers.insert(numbers.end(), more.begin(), more.end());
+    Append(ListNumbers(&*of->inertial), &numbers);
     return numbers;
   };
   PrintedLink before = link;

@@ -19,8 +19,7 @@ struct LinkEdit {
 
 /// Poses and numbers that conventions of a link refer to.
 struct EditFrames {
-  bool is_own = false;       ///< The link's own origin places it in its parent's frame.
-  std::vector<Pose> X_PL{};  ///< Other poses of it there: by several origins, and as right.
+  std::vector<Pose> X_PL{};  ///< The link in its parent's frame: by its origins, and as right.
   std::vector<Pose> X_LC{};  ///< Links on it, in its frame.
   /// The right mass and centre, where they are wrong: faults of one body must not hide each other.
   std::optional<std::pair<double, Vector3d>> right{};

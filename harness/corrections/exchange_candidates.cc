@@ -9,16 +9,8 @@ namespace {
 
 using Kind = CorrectionKind;
 
-bool IsSameInertial(const PrintedInertial& a, const PrintedInertial& b) {
-  return a.mass.value == b.mass.value && a.origin.t == b.origin.t && a.origin.r == b.origin.r && a.I == b.I;
-}
-
 /// Takes what a fault is about from another link.
 void TakeOf(const FileFault& fault, const PrintedLink& from, PrintedLink* to) {
-  const auto take_place = [](const PrintedOrigin& x, PrintedOrigin* y) {
-    y->t = x.t;
-    y->half_t = x.half_t;
-  };
   if (fault.whole && IsOfBody(fault.of)) {
     to->inertial = from.inertial;
   } else if (fault.whole) {
@@ -28,17 +20,17 @@ void TakeOf(const FileFault& fault, const PrintedLink& from, PrintedLink* to) {
   } else if (fault.of == SiteKind::kMass) {
     to->inertial->mass = from.inertial->mass;
   } else if (fault.of == SiteKind::kCom) {
-    take_place(from.inertial->origin, &to->inertial->origin);
+    to->inertial->origin.TakePlace(from.inertial->origin);
   } else if (fault.of == SiteKind::kPosition) {
-    take_place(from.origin, &to->origin);
+    to->origin.TakePlace(from.origin);
   } else if (fault.of == SiteKind::kRotation) {
     PrintedOrigin origin = from.origin;
-    take_place(to->origin, &origin);
+    origin.TakePlace(to->origin);
     to->origin = origin;
   } else {
     PrintedInertial inertial = *from.inertial;
     inertial.mass = to->inertial->mass;
-    take_place(to->inertial->origin, &inertial.origin);
+    inertial.origin.TakePlace(to->inertial->origin);
     to->inertial = inertial;
   }
 }
@@ -71,7 +63,7 @@ void CandidateSearch::SearchExchanges() {
       };
       if ((both & kBodyMask) != 0 && one.inertial && two.inertial) {
         offer(SiteKind::kMass, true, kBodyMask);
-        for (const SiteKind kind : {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) {
+        for (const SiteKind kind : kBodyKinds) {
           if ((both & MaskOf(kind)) != 0) offer(kind, false, MaskOf(kind));
         }
       }
@@ -128,21 +120,21 @@ void CandidateSearch::SearchCopy(int link, double which) {
   // Robots have equal parts: a single quantity that differs, or an inertial that one file lacks, is no copy.
   if (std::popcount(WrongOf(link) & kBodyMask) < 2 || !(pair_.right(link).body.mass > 0.0)) return;
   if (!one.inertial || pair_.node(link).parts.size() != 1) return;
-  const BodyNumbers& given = pair_.given(link).body;
-  const BodyNumbers& open = pair_.given(link).body_tolerance;
-  const BodyNumbers right = pair_.right(link).body;
+  const MassProperties& given = pair_.given(link).body;
+  const MassProperties& open = pair_.given(link).body_tolerance;
+  const MassProperties right = pair_.right(link).body;
   const auto is_near = [](double apart, double open_) { return apart <= 2.0 * open_ + 1e-9; };
   for (const int k : pair_.links()) {
     const PrintedLink& two = pair_.a().link(k);
     if (k == link || !two.inertial) continue;
-    const BodyNumbers& other = pair_.right(k).body;
-    const bool copied = !is_second_ && IsSameInertial(*one.inertial, *two.inertial);
+    const MassProperties& other = pair_.right(k).body;
+    const bool copied = !is_second_ && !IsOther(one.inertial, two.inertial);
     const bool is_other = other.mass > 0.0 && is_near(std::abs(given.mass - other.mass), open.mass) &&
                           is_near((given.com - other.com).norm(), open.com.norm()) &&
                           is_near((given.inertia - other.inertia).norm(), open.inertia.norm());
     // Two equal links say nothing, nor does a link whose frame alone differs.
-    const BodyNumbers& own = pair_.other(pair_.Partner(link)).body;
-    const BodyNumbers& theirs = pair_.other(pair_.Partner(k)).body;
+    const MassProperties& own = pair_.other(pair_.Partner(link)).body;
+    const MassProperties& theirs = pair_.other(pair_.Partner(k)).body;
     const bool is_twin = is_near((own.com - theirs.com).norm(), open.com.norm()) &&
                          is_near((own.inertia - theirs.inertia).norm(), open.inertia.norm());
     if ((!copied && !is_other) || (is_twin && own.mass == theirs.mass)) continue;
@@ -182,8 +174,7 @@ void CandidateSearch::SearchSecond(int link) {
     pair_.MeasureOther(link);
     std::vector<Site> right;
     bool holds = true;
-    for (const SiteKind kind :
-         {SiteKind::kPosition, SiteKind::kRotation, SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) {
+    for (const SiteKind kind : kNodeKinds) {
       if ((mask & MaskOf(kind)) == 0) continue;
       const bool is_right = pair_.CompareNode(kind, link) <= 1.0;
       if (is_right && IsWrong(link, kind)) right.push_back({kind, link});

@@ -15,14 +15,6 @@ constexpr const char* kJointKinds[] = {"fixed", "revolute", "prismatic", "ball",
 
 const char* NameKind(const PrintedLink& link) { return kJointKinds[static_cast<size_t>(link.joint.kind)]; }
 
-std::string DescribeRight(double given, double right) {
-  return fmt::format("{:.6g} here, {:.6g} in the other file", given, right);
-}
-
-std::string DescribeRight(const Vector3d& given, const Vector3d& right) {
-  return fmt::format("({}) here, ({}) in the other file", ShowVector(given), ShowVector(right));
-}
-
 EditTrial MakeTrial(Kind kind, SiteKind of, double bits, std::string values = "", int component = 0) {
   return {{kind, of, component}, bits, 0, std::move(values)};
 }
@@ -117,8 +109,7 @@ void CandidateSearch::SearchMimic(int link) {
   if (joint.mimic->multiplier.value == -other.mimic->multiplier.value &&
       !Differ(joint.mimic->offset, other.mimic->offset))
     add(Kind::kSign, 0.0, values);
-  if (values.empty())
-    values = fmt::format("follows {} here, {} in the other file", joint.mimic->leader, other.mimic->leader);
+  if (values.empty()) values = "follows " + DescribeRight(joint.mimic->leader, other.mimic->leader);
   add(Kind::kNumber, bits, values);
 }
 
@@ -175,8 +166,7 @@ void CandidateSearch::SearchJoint(int link) {
     AddSimple(MakeTrial(Kind::kNumber, SiteKind::kCarrier, 8.0, values), link, [](PrintedLink*) {});
   }
   if (IsWrong(link, SiteKind::kType) && given.joint.kind != other.joint.kind) {
-    AddSimple(MakeTrial(Kind::kNumber, SiteKind::kType, 3.0,
-                        fmt::format("{} here, {} in the other file", NameKind(given), NameKind(other))),
+    AddSimple(MakeTrial(Kind::kNumber, SiteKind::kType, 3.0, DescribeRight(NameKind(given), NameKind(other))),
               link, [&](PrintedLink* made) {
                 const Vector3d axis = HasAxis(given) && HasAxis(other) ? given.joint.axis : right.axis;
                 made->joint = other.joint;
@@ -209,11 +199,10 @@ void CandidateSearch::SearchMotors(const Site& site) {
   for (PrintedMotor& motor : moved.motors) {
     const PrintedMotor right = pair_.FindRight(motor);
     if (right.link != motor.link)
-      say(fmt::format("{} drives {} here, {} in the other file", motor.name,
-                      moved.link(motor.link).joint.name, moved.link(right.link).joint.name),
+      say(motor.name + " drives " +
+              DescribeRight(moved.link(motor.link).joint.name, moved.link(right.link).joint.name),
           3.0);
-    if (right.servo != motor.servo)
-      say(fmt::format("{} {} here, {} in the other file", motor.name, motor.servo, right.servo), 12.0);
+    if (right.servo != motor.servo) say(motor.name + " " + DescribeRight(motor.servo, right.servo), 12.0);
     motor = right;
   }
   TakeMotors(&moved);
@@ -255,9 +244,8 @@ void CandidateSearch::SearchRobot() {
       add(second ? Kind::kMissing : Kind::kSurplus, 3.0,
           fmt::format("joint {}, link {}", link.joint.name, link.name));
     } else if (site.kind == SiteKind::kType && site.link == 0 && a.floats && b.floats) {
-      const auto name = [](bool floats) { return floats ? "floating" : "fixed"; };
-      add(Kind::kNumber, 3.0,
-          fmt::format("{} base here, {} in the other file", name(*a.floats), name(*b.floats)));
+      const auto name = [](bool floats) { return std::string(floats ? "floating" : "fixed"); };
+      add(Kind::kNumber, 3.0, DescribeRight(name(*a.floats) + " base", name(*b.floats)));
     } else if (site.kind == SiteKind::kConstraint) {
       const auto list = [](const PrintedRobot& robot, const PrintedRobot& other) {
         std::vector<std::string> only;

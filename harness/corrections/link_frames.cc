@@ -288,8 +288,8 @@ class FrameChooser {
   void Register(int link, const Pose& X_right, const PoseTolerance& open,
                 std::vector<FrameChoice>* choices) const {
     const std::vector<CarriedAxis>& axes = axes_[static_cast<size_t>(link)];
-    const BodyNumbers& a = pair_.given(link).body;
-    const BodyNumbers& b = pair_.other(pair_.Partner(link)).body;
+    const MassProperties& a = pair_.given(link).body;
+    const MassProperties& b = pair_.other(pair_.Partner(link)).body;
     const bool has_bodies = a.mass != 0.0 && b.mass != 0.0;
     for (const Matrix3d& R : ListTurns(axes, has_bodies ? &a : nullptr, has_bodies ? &b : nullptr)) {
       Matrix3d normal = Matrix3d::Zero();
@@ -322,7 +322,7 @@ class FrameChooser {
   }
 
   [[nodiscard]] static std::vector<Matrix3d> ListTurns(const std::vector<CarriedAxis>& axes,
-                                                       const BodyNumbers* a, const BodyNumbers* b) {
+                                                       const MassProperties* a, const MassProperties* b) {
     constexpr double kApart = 1e-5;  // m
     constexpr size_t kMost = 8;
     std::vector<std::pair<Vector3d, Vector3d>> ways;

@@ -101,9 +101,8 @@ class LinkMatcher {
     const std::vector<std::string> others = list(b_, match_.a_of_b, &open_b);
     const std::vector<std::string> similar = FindAlikeNames(names, others);
     for (size_t k = 0; k < similar.size(); ++k) {
-      const auto found = std::ranges::find(others, similar[k]);
-      if (found != others.end() && Take(open[k], open_b[static_cast<size_t>(found - others.begin())]))
-        by_joint->push_back(open[k]);
+      const int found = IndexOf(others, similar[k]);
+      if (found >= 0 && Take(open[k], open_b[Index(found)])) by_joint->push_back(open[k]);
     }
   }
 
@@ -249,23 +248,15 @@ Pose CalcPartPose(const PrintedRobot& robot, const Node& node, int part) {
   return X;
 }
 
-BodyNumbers CalcNodeBody(const PrintedRobot& robot, const Node& node) {
-  BodyNumbers sum;
-  Matrix3d about_origin = Matrix3d::Zero();
+MassProperties CalcNodeBody(const PrintedRobot& robot, const Node& node) {
+  std::vector<MassProperties> bodies;
   for (const int part : node.parts) {
     const PrintedInertial& inertial = *robot.link(part).inertial;
     const Pose X = CalcPartPose(robot, node, part);
     const Matrix3d R = X.linear() * inertial.origin.CalcRotation();
-    const Vector3d c = X * inertial.origin.t;
-    const Matrix3d I = R * ToTensor(inertial.I) * R.transpose();
-    if (node.parts.size() == 1) return {inertial.mass.value, c, I};
-    sum.mass += inertial.mass.value;
-    sum.com += inertial.mass.value * c;
-    about_origin += I + CalcPointInertia(inertial.mass.value, c);
+    bodies.push_back({inertial.mass.value, X * inertial.origin.t, R * ToTensor(inertial.I) * R.transpose()});
   }
-  if (sum.mass != 0.0) sum.com /= sum.mass;
-  sum.inertia = about_origin - CalcPointInertia(sum.mass, sum.com);
-  return sum;
+  return bodies.size() == 1 ? bodies[0] : Combine(bodies);
 }
 
 void AddChange(const Pose& before, const Pose& after, PoseTolerance* tolerance) {
@@ -273,7 +264,7 @@ void AddChange(const Pose& before, const Pose& after, PoseTolerance* tolerance) 
   tolerance->angle += CalcAngle(before.linear().transpose() * after.linear());
 }
 
-void AddChange(const BodyNumbers& before, const BodyNumbers& after, BodyNumbers* tolerance) {
+void AddChange(const MassProperties& before, const MassProperties& after, MassProperties* tolerance) {
   tolerance->mass += std::abs(after.mass - before.mass);
   tolerance->com += (after.com - before.com).cwiseAbs();
   tolerance->inertia += (after.inertia - before.inertia).cwiseAbs();
@@ -294,10 +285,10 @@ PoseTolerance CalcPoseTolerance(const Node& node, PrintedRobot* robot) {
   return tolerance;
 }
 
-BodyNumbers CalcBodyTolerance(const Node& node, PrintedRobot* robot) {
+MassProperties CalcBodyTolerance(const Node& node, PrintedRobot* robot) {
   constexpr double kLeast = 1e-9;
-  BodyNumbers tolerance;
-  const BodyNumbers body = CalcNodeBody(*robot, node);
+  MassProperties tolerance;
+  const MassProperties body = CalcNodeBody(*robot, node);
   const auto measure = [&] { return CalcNodeBody(*robot, node); };
   for (const int part : node.parts) {
     AddHalves(&*robot->link(part).inertial, measure, &tolerance);

@@ -40,12 +40,7 @@ struct Node {
 /// file lacks are left out with all that they carry.
 std::vector<Node> ListNodes(const PrintedRobot& robot, const std::vector<int>& other);
 
-/// Mass, centre and inertia about it in a link's frame, or the tolerances that digits give them.
-struct BodyNumbers {
-  double mass = 0.0;
-  Vector3d com = Vector3d::Zero();
-  Matrix3d inertia = Matrix3d::Zero();
-};
+// Mass properties are those in a link's frame, or the tolerances that digits give them.
 
 /// A pose and the tolerance that digits give it.
 struct PoseTolerance {
@@ -56,13 +51,13 @@ struct PoseTolerance {
 Pose CalcNodePose(const PrintedRobot& robot, const Node& node);
 /// Pose of the frame of one of its parts in a node's frame.
 Pose CalcPartPose(const PrintedRobot& robot, const Node& node, int part);
-BodyNumbers CalcNodeBody(const PrintedRobot& robot, const Node& node);
+MassProperties CalcNodeBody(const PrintedRobot& robot, const Node& node);
 /// Tolerance of these by the half units of the digits. @param robot is changed and put back.
 PoseTolerance CalcPoseTolerance(const Node& node, PrintedRobot* robot);
-BodyNumbers CalcBodyTolerance(const Node& node, PrintedRobot* robot);
+MassProperties CalcBodyTolerance(const Node& node, PrintedRobot* robot);
 
 /// Adds |after - before|.
 void AddChange(const Pose& before, const Pose& after, PoseTolerance* tolerance);
-void AddChange(const BodyNumbers& before, const BodyNumbers& after, BodyNumbers* tolerance);
+void AddChange(const MassProperties& before, const MassProperties& after, MassProperties* tolerance);
 
 }  // namespace dexcheck

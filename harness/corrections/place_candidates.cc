@@ -75,7 +75,7 @@ void CandidateSearch::SearchPlace(int link) {
     origin.moved =
         ((X.translation() - origin.right.translation()).cwiseAbs().array() > origin.open_length.array())
             .any();
-    EditFrames frames{false, {X}};
+    EditFrames frames{{X}};
     if (origin.turned) frames.X_PL.push_back(origin.right);
     const bool turns = origin.turned && (one || !origin.moved);
     const bool moves = origin.moved && (one || !origin.turned);
@@ -146,7 +146,7 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
       is_one_angle = true;
       const double value = std::abs(solved[k]) <= half ? 0.0 : solved[k];
       offer(CorrectionKind::kNumber, 1.0 + std::min(CountBits(value, half), CountBits(angle, half)),
-            fmt::format("{} {:.6g} here, {:.6g} in the other file", kAngleNames[k], r[k], value));
+            fmt::format("{} {}", kAngleNames[k], DescribeRight(r[k], value)));
     }
     for (const Vector3d& angles : SolveRollPitchYaw(right)) {
       if (is_one_angle) break;
@@ -232,7 +232,7 @@ void CandidateSearch::SearchAllOrigins(int link) {
     has_welded = has_welded || pair_.node(child).chain.size() > 1;
     wrong |= WrongOf(child) & kPoseMask;
     for (const int k : pair_.node(child).chain) {
-      if (std::ranges::find(origins, k) == origins.end()) origins.push_back(k);
+      if (!Contains(origins, k)) origins.push_back(k);
     }
   }
   if (!has_welded || wrong == 0) return;
@@ -270,12 +270,12 @@ void CandidateSearch::SearchWeld(int link) {
   std::erase_if(own.parts, [&](int part) { return !is_below(part); });
   std::erase_if(others.parts, is_below);
   if (own.parts.empty()) return;
-  const BodyNumbers& whole = pair_.right(home).body;
-  const std::optional<BodyNumbers> alone = Subtract(whole, CalcNodeBody(a, others));
+  const MassProperties& whole = pair_.right(home).body;
+  const std::optional<MassProperties> alone = Subtract(whole, CalcNodeBody(a, others));
   if (!alone) return;
   const Pose X = CalcPartPose(a, node, link);
-  const BodyNumbers right = Express(*alone, origin.CalcPose() * X.inverse());
-  const BodyNumbers given = Express(CalcNodeBody(a, own), X.inverse());
+  const MassProperties right = ExpressIn(*alone, origin.CalcPose() * X.inverse());
+  const MassProperties given = ExpressIn(CalcNodeBody(a, own), X.inverse());
   const Vector3d t = right.com - origin.CalcRotation() * given.com;
   const Vector3d open =
       Vector3d::Constant(pair_.given(home).body_tolerance.com.norm() * whole.mass / alone->mass + 1e-6);

@@ -20,6 +20,12 @@ std::vector<GivenNode> MeasureNodes(const std::vector<Node>& nodes, PrintedRobot
   return given;
 }
 
+/// The link that a joint of that name moves; -1 where there is none.
+int FindMoved(const PrintedRobot& robot, const std::string& joint) {
+  return IndexOf(robot.links, std::pair(true, joint),
+                 [](const PrintedLink& link) { return std::pair(Moves(link), link.joint.name); });
+}
+
 /// Accuracy of frames that are found from what links carry, m and rad.
 constexpr double kFoundFrame = 2e-6;
 
@@ -130,9 +136,7 @@ void PrintedPair::SetRight(int link) {
   right.axis_tolerance = joint.half_axis.sum() / std::max(joint.axis.norm(), 1e-9) + 1e-8 + open.angle;
   right.anchor = X * joint.anchor;
   right.anchor_tolerance = open.length.norm() + open.angle * joint.anchor.norm();
-  right.body = theirs.body;
-  right.body.com = X * theirs.body.com;
-  right.body.inertia = R * theirs.body.inertia * R.transpose();
+  right.body = ExpressIn(theirs.body, X);
   right.body_tolerance = theirs.body_tolerance;
   if (!R.isIdentity(1e-12)) {
     const Matrix3d turn = R.cwiseAbs();
@@ -144,14 +148,14 @@ void PrintedPair::SetRight(int link) {
   right.body_tolerance.inertia.array() += 2.0 * open.angle * std::abs(theirs.body.inertia.trace());
 }
 
-double PrintedPair::CompareNode(SiteKind kind, int link, const Pose& X, const PoseTolerance& pose,
-                                const BodyNumbers& body, const BodyNumbers& tolerance) const {
+double PrintedPair::CompareNode(SiteKind kind, int link, const GivenNode& now) const {
   const RightNode& right = right_[static_cast<size_t>(link)];
+  const MassProperties &body = now.body, &tolerance = now.body_tolerance;
   switch (kind) {
     case SiteKind::kPosition:
-      return CompareVectors(X.translation() - right.X.translation(), pose.length + right.pose.length);
+      return CompareVectors(now.X.translation() - right.X.translation(), now.pose.length + right.pose.length);
     case SiteKind::kRotation:
-      return CalcAngle(X.linear().transpose() * right.X.linear()) / (pose.angle + right.pose.angle);
+      return CalcAngle(now.X.linear().transpose() * right.X.linear()) / (now.pose.angle + right.pose.angle);
     case SiteKind::kMass:
       return std::abs(body.mass - right.body.mass) / (tolerance.mass + right.body_tolerance.mass + 1e-15);
     case SiteKind::kCom:
@@ -172,11 +176,6 @@ double PrintedPair::CompareNode(SiteKind kind, int link, const Pose& X, const Po
   }
 }
 
-double PrintedPair::CompareNode(SiteKind kind, int link) const {
-  const GivenNode& own = given(link);
-  return CompareNode(kind, link, own.X, own.pose, own.body, own.body_tolerance);
-}
-
 bool PrintedPair::States(const PrintedRobot& robot, JointScalar scalar) {
   return std::ranges::any_of(robot.links, [&](const PrintedLink& link) {
     const auto& number = link.joint.scalars[static_cast<size_t>(scalar)];
@@ -193,29 +192,25 @@ std::optional<PrintedScalar> TakeScalar(const PrintedLink& link, JointScalar sca
 
 bool PrintedPair::IsCoupledAlike(int link) const {
   // q1 = 2 q3 says what q3 = q1 / 2 says.
-  const auto find = [](const PrintedRobot& robot, const std::string& name) {
-    const auto found = std::ranges::find_if(
-        robot.links, [&](const PrintedLink& l) { return Moves(l) && l.joint.name == name; });
-    return found == robot.links.end() ? -1 : static_cast<int>(found - robot.links.begin());
-  };
   const auto is_inverse = [&](int follower, int leader_b) {
     const PrintedMimic& mimic = *a_.link(follower).joint.mimic;
-    const int leader = find(a_, mimic.leader);
+    const int leader = FindMoved(a_, mimic.leader);
     if (leader < 0 || Partner(leader) != leader_b || a_.link(leader).joint.mimic) return false;
     const std::optional<PrintedMimic>& other = b_.link(leader_b).joint.mimic;
     constexpr double kSame = 1e-6;
-    return other && find(b_, other->leader) == Partner(follower) && !b_.link(Partner(follower)).joint.mimic &&
+    return other && FindMoved(b_, other->leader) == Partner(follower) &&
+           !b_.link(Partner(follower)).joint.mimic &&
            std::abs(mimic.multiplier.value * other->multiplier.value - 1.0) <= kSame &&
            mimic.offset.value == 0.0 && other->offset.value == 0.0;
   };
   const PrintedJoint& ours = a_.link(link).joint;
   const PrintedJoint& theirs = b_.link(Partner(link)).joint;
   if (ours.mimic && !theirs.mimic) {
-    const int leader = find(a_, ours.mimic->leader);
+    const int leader = FindMoved(a_, ours.mimic->leader);
     return leader >= 0 && Partner(leader) >= 0 && is_inverse(link, Partner(leader));
   }
   if (!ours.mimic && theirs.mimic) {
-    const int leader_b = find(b_, theirs.mimic->leader);
+    const int leader_b = FindMoved(b_, theirs.mimic->leader);
     const int follower = leader_b < 0 ? -1 : match_.a_of_b[static_cast<size_t>(leader_b)];
     return follower >= 0 && a_.link(follower).joint.mimic && is_inverse(follower, Partner(link));
   }
@@ -255,9 +250,8 @@ void PrintedPair::ListJointSites(int link, std::vector<Site>* sites) const {
   if (ours.mimic.has_value() != theirs.mimic.has_value()) {
     add(SiteKind::kMimic);
   } else if (ours.mimic) {
-    const auto leads = [&](const PrintedLink& l) { return Moves(l) && l.joint.name == ours.mimic->leader; };
-    const auto leader = std::ranges::find_if(a_.links, leads);
-    const int partner = leader == a_.links.end() ? -1 : Partner(static_cast<int>(leader - a_.links.begin()));
+    const int leader = FindMoved(a_, ours.mimic->leader);
+    const int partner = leader < 0 ? -1 : Partner(leader);
     const bool same_leader = partner >= 0 ? b_.link(partner).joint.name == theirs.mimic->leader
                                           : ours.mimic->leader == theirs.mimic->leader;
     if (!same_leader || Differ(ours.mimic->multiplier, theirs.mimic->multiplier) ||
@@ -288,8 +282,8 @@ void PrintedPair::ListConstantSites(int link, std::vector<Site>* sites) const {
 }
 
 PrintedMotor PrintedPair::FindRight(PrintedMotor motor) const {
-  const auto other = std::ranges::find(b_.motors, motor.name, &PrintedMotor::name);
-  if (other == b_.motors.end()) return motor;
+  const PrintedMotor* const other = FindIn(b_.motors, motor.name, &PrintedMotor::name);
+  if (other == nullptr) return motor;
   const int link = match_.a_of_b[static_cast<size_t>(other->link)];
   if (link >= 0) motor.link = link;
   if (!motor.servo.empty() && !other->servo.empty()) motor.servo = other->servo;
@@ -349,7 +343,7 @@ std::vector<Site> PrintedPair::ListSites() const {
     // A base that stands still needs no inertial.
     const bool bears = !(link == 0 || j == 0) || (!node(link).parts.empty() && !node_b(j).parts.empty());
     if (!bears || (node(link).parts.empty() && node_b(j).parts.empty())) continue;
-    for (const SiteKind kind : {SiteKind::kMass, SiteKind::kCom, SiteKind::kInertia}) compare(kind, link);
+    for (const SiteKind kind : kBodyKinds) compare(kind, link);
   }
   ListRobotSites(&sites);
   return sites;

@@ -11,24 +11,21 @@
 
 namespace dexcheck {
 
-/// The right values of a link, in the first file's frames of it and of its parent, and the
-/// tolerances that the second file's digits give them.
-struct RightNode {
-  bool is_placed = false;  ///< Whether both files have it on the same link.
+/// A link's numbers as a file has them, and the tolerances that its digits give them.
+struct GivenNode {
   Pose X = Pose::Identity();
   PoseTolerance pose;
+  MassProperties body, body_tolerance;
+};
+
+/// The right values of a link, in the first file's frames of it and of its parent, with the tolerances of the
+/// second file's digits.
+struct RightNode : GivenNode {
+  bool is_placed = false;  ///< Whether both files have it on the same link.
   Vector3d axis = Vector3d::UnitZ();
   double axis_tolerance = 0.0;
   Vector3d anchor = Vector3d::Zero();
   double anchor_tolerance = 0.0;
-  BodyNumbers body, body_tolerance;
-};
-
-/// A link's numbers as the first file has them.
-struct GivenNode {
-  Pose X = Pose::Identity();
-  PoseTolerance pose;
-  BodyNumbers body, body_tolerance;
 };
 
 class PrintedPair {
@@ -60,12 +57,12 @@ class PrintedPair {
   /// Numbers of the second file in its own frames.
   [[nodiscard]] const GivenNode& other(int link) const { return other_[static_cast<size_t>(link)]; }
 
-  /// How far a number of the robot as it is now is from right, relative to its digits' tolerance; at most 1:
-  /// it is right.
-  [[nodiscard]] double CompareNode(SiteKind kind, int link, const Pose& X, const PoseTolerance& pose,
-                                   const BodyNumbers& body, const BodyNumbers& tolerance) const;
+  /// How far a number is from right, relative to its digits' tolerance; at most 1: it is right.
+  [[nodiscard]] double CompareNode(SiteKind kind, int link, const GivenNode& now) const;
   /// Compares the numbers as they were measured.
-  [[nodiscard]] double CompareNode(SiteKind kind, int link) const;
+  [[nodiscard]] double CompareNode(SiteKind kind, int link) const {
+    return CompareNode(kind, link, given(link));
+  }
   /// Measures the first file's numbers again. @pre links were changed.
   void Measure();
   /// Measures the second file's numbers of one link. @pre it was changed.

@@ -143,6 +143,17 @@ void PrintedOrigin::SetRow(const Pose& pose) {
   t << X.translation().x(), 0.0, Vector3d(0.0, -std::sin(alpha), std::cos(alpha)).dot(X.translation());
 }
 
+bool IsTurned(const PrintedOrigin& x, const PrintedOrigin& y) {
+  return x.r != y.r || x.form != y.form || x.sequence != y.sequence;
+}
+
+bool IsOther(const PrintedOrigin& x, const PrintedOrigin& y) { return x.t != y.t || IsTurned(x, y); }
+
+bool IsOther(const std::optional<PrintedInertial>& x, const std::optional<PrintedInertial>& y) {
+  if (!x || !y) return x.has_value() != y.has_value();
+  return x->mass.value != y->mass.value || x->I != y->I || IsOther(x->origin, y->origin);
+}
+
 std::vector<LinkNumber> ListNumbers(PrintedOrigin* origin) {
   std::vector<LinkNumber> numbers;
   numbers.reserve(7);

@@ -12,6 +12,7 @@
 
 #include "controller/common/types.h"
 #include "controller/model/rigid_body.h"
+#include "harness/base/ranges.h"
 #include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {
@@ -44,6 +45,10 @@ struct PrintedOrigin {
 
   [[nodiscard]] Matrix3d CalcRotation() const;
   [[nodiscard]] Pose CalcPose() const;
+  void TakePlace(const PrintedOrigin& other) {
+    t = other.t;
+    half_t = other.half_t;
+  }
   /// Takes another rotation, in the form of a quaternion unless it is roll, pitch, yaw.
   void SetRotation(const Matrix3d& R);
   /// Takes the row behind X_before that is nearest to a pose.
@@ -57,6 +62,10 @@ struct PrintedInertial {
   /// xx yy zz xy xz yz about the centre, kg m^2.
   Vector6d I = Vector6d::Zero(), half_I = Vector6d::Zero();  // NOLINT(readability-identifier-naming)
 };
+
+bool IsTurned(const PrintedOrigin& x, const PrintedOrigin& y);
+bool IsOther(const PrintedOrigin& x, const PrintedOrigin& y);
+bool IsOther(const std::optional<PrintedInertial>& x, const std::optional<PrintedInertial>& y);
 
 enum class JointKind { kFixed, kHinge, kSlide, kBall, kFree };
 

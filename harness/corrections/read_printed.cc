@@ -347,8 +347,7 @@ PrintedRobot PrintDescription(const RobotDescription& description) {
     const Pose X_iL =
         frame.link < 0 ? Pose::Identity() : description.joints[static_cast<size_t>(frame.link)].X_iL;
     link.origin = PrintPose(X_iL.inverse() * frame.X_LF);
-    const auto has_name = [&](const PrintedLink& other) { return other.name == frame.name; };
-    if (std::ranges::none_of(robot.links, has_name)) robot.Add(std::move(link));
+    if (!Contains(robot.links, frame.name, &PrintedLink::name)) robot.Add(std::move(link));
   }
   return robot;
 }
@@ -363,8 +362,8 @@ PrintedRobot ReadPrintedRobot(const DescriptionFile& file, const DescriptionFile
              carrier->format() != RobotFormat::kBodies) {
     robot = ReadPrintedRobot(*carrier);
     for (const TabledBody& row : ReadBodyTable(file.text(), file.path().string())) {
-      const auto link = std::ranges::find(robot.links, row.link, &PrintedLink::name);
-      if (link != robot.links.end()) link->inertial = PrintBody(row.body);
+      PrintedLink* const link = FindIn(robot.links, row.link, &PrintedLink::name);
+      if (link != nullptr) link->inertial = PrintBody(row.body);
     }
   } else {
     robot = PrintDescription(file.Describe());

@@ -269,8 +269,7 @@ class PrintedMjcfReader {
   /// Sites are frames on links; those that have a link's name are left out.
   void AddFrames() {
     for (PrintedLink& frame : frames_) {
-      if (std::ranges::find(robot_.links, frame.name, &PrintedLink::name) == robot_.links.end())
-        robot_.Add(std::move(frame));
+      if (!Contains(robot_.links, frame.name, &PrintedLink::name)) robot_.Add(std::move(frame));
     }
   }
 
@@ -320,9 +319,8 @@ class PrintedMjcfReader {
       robot_.has_motors = true;
       PrintedMotor motor;
       motor.name = NameOf(engine_, mjOBJ_ACTUATOR, i);
-      const std::string joint = NameOf(engine_, mjOBJ_JOINT, engine_.actuator_trnid[2 * i]);
-      const auto drives = [&](const PrintedLink& link) { return link.joint.name == joint; };
-      motor.link = static_cast<int>(std::ranges::find_if(robot_.links, drives) - robot_.links.begin());
+      motor.link = IndexOf(robot_.links, NameOf(engine_, mjOBJ_JOINT, engine_.actuator_trnid[2 * i]),
+                           [](const PrintedLink& link) { return link.joint.name; });
       motor.gear = engine_.actuator_gear[6 * i];
       const mjtNum* const bias = engine_.actuator_biasprm + mjNBIAS * i;
       if (engine_.actuator_biastype[i] != mjBIAS_NONE && (bias[1] != 0.0 || bias[2] != 0.0))

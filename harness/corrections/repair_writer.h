@@ -28,15 +28,6 @@ inline std::string Format(double value, double size = 0.0) {
   return FormatNumber(std::abs(value) < kRounding * std::max(size, 1e-3) ? 0.0 : value, kDigits);
 }
 
-inline bool IsTurned(const PrintedOrigin& x, const PrintedOrigin& y) {
-  return x.r != y.r || x.form != y.form || x.sequence != y.sequence;
-}
-inline bool IsOther(const PrintedOrigin& x, const PrintedOrigin& y) { return x.t != y.t || IsTurned(x, y); }
-inline bool IsOther(const std::optional<PrintedInertial>& x, const std::optional<PrintedInertial>& y) {
-  if (!x || !y) return x.has_value() != y.has_value();
-  return x->mass.value != y->mass.value || x->I != y->I || IsOther(x->origin, y->origin);
-}
-
 /// The inertia along the link's axes: xx yy zz xy xz yz.
 inline Vector6d CalcInertia(const PrintedInertial& body) {
   const Matrix3d R = body.origin.CalcRotation();

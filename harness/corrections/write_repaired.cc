@@ -101,15 +101,14 @@ class UrdfRepair final : private RepairWriter {
 
   std::string Write() {
     for (const UrdfLink& link : urdf_.links()) {
-      const auto at = std::ranges::find(before_.links, link.name, &PrintedLink::name);
-      const auto i = static_cast<int>(at - before_.links.begin());
-      const PrintedLink& after = after_.link(i);
+      const int i = IndexOf(before_.links, link.name, &PrintedLink::name);
+      const PrintedLink &before = before_.link(i), &after = after_.link(i);
       if (link.parent_joint >= 0) {
         element_ = urdf_.joint(link.parent_joint).element;
         WriteJoint(i);
-        WriteOrigin(at->origin, after.origin, "", element_);
+        WriteOrigin(before.origin, after.origin, "", element_);
       }
-      if (IsOther(at->inertial, after.inertial)) WriteBody(*at, after, link.element);
+      if (IsOther(before.inertial, after.inertial)) WriteBody(before, after, link.element);
     }
     return urdf_.Print();
   }
@@ -209,11 +208,9 @@ class MjcfRepair final : private RepairWriter {
   /// Writes the sites of a body and of all bodies on it.
   void WriteFrames(XmlElement* body) {
     for (XmlElement* site : ListChildren(body, "site")) {
-      const std::string name = ReadAttribute(*site, "name");
-      const auto is_it = [&](const PrintedLink& link) { return link.is_frame && link.name == name; };
-      const auto frame = std::ranges::find_if(before_.links, is_it);
-      if (frame != before_.links.end())
-        WriteOrigin(frame->origin, after_.link(static_cast<int>(frame - before_.links.begin())).origin, site);
+      const int frame = IndexOf(before_.links, std::pair(true, ReadAttribute(*site, "name")),
+                                [](const PrintedLink& link) { return std::pair(link.is_frame, link.name); });
+      if (frame >= 0) WriteOrigin(before_.link(frame).origin, after_.link(frame).origin, site);
     }
     for (XmlElement* child : ListChildren(body, "body")) WriteFrames(child);
   }

@@ -191,14 +191,8 @@ class BodyAudit {
 };
 
 /// Words that stand for one side, and the other side's.
-constexpr std::array<std::pair<const char*, const char*>, 8> kSides = {{{"left", "right"},
-                                                                        {"l", "r"},
-                                                                        {"fl", "fr"},
-                                                                        {"rl", "rr"},
-                                                                        {"hl", "hr"},
-                                                                        {"bl", "br"},
-                                                                        {"lf", "rf"},
-                                                                        {"lh", "rh"}}};
+constexpr const char* kSides[][2] = {{"left", "right"}, {"l", "r"},   {"fl", "fr"}, {"rl", "rr"},
+                                     {"hl", "hr"},      {"bl", "br"}, {"lf", "rf"}, {"lh", "rh"}};
 
 /// The name of the part on the other side, for a part on the left: its first word that says so is replaced.
 /// Empty for others. Words end at _ - . : / blanks and where a capital letter follows a small one.

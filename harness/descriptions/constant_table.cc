@@ -8,7 +8,7 @@ namespace dexcheck {
 namespace {
 
 using P = PartKind;
-using Index = Constant::Index;
+using I = Constant::Index;
 
 std::string DescribeDamping(const Joint& joint, double value, double least_inertia) {
   return fmt::format(": rates of {} decay within {:.2g} s", joint.name, least_inertia / value);
@@ -36,61 +36,46 @@ bool LimitsForce(const mjModel& m, int motor) { return m.actuator_forcelimited[m
 
 // A constant that is compared between two models alone has no neutral value.
 constexpr Constant kConstants[] = {
-    {"joint_damping", P::kJoint, "damping", &mjModel::dof_damping, Index::kDof, 1, 0.0, nullptr, kFreeJoint},
-    {"joint_armature", P::kJoint, "armature", &mjModel::dof_armature, Index::kDof, 1, 0.0, nullptr,
-     kFreeJoint},
-    {"joint_limited", P::kJoint, "limited", &mjModel::jnt_limited, Index::kPart, 1, 0.0, nullptr,
+    {"joint_damping", P::kJoint, "damping", &mjModel::dof_damping, I::kDof, 1, 0.0, nullptr, kFreeJoint},
+    {"joint_armature", P::kJoint, "armature", &mjModel::dof_armature, I::kDof, 1, 0.0, nullptr, kFreeJoint},
+    {"joint_limited", P::kJoint, "limited", &mjModel::jnt_limited, I::kPart, 1, 0.0, nullptr,
      kFreeJoint | kWheelJoint},
-    {"joint_spring", P::kJoint, "stiffness", &mjModel::jnt_stiffness, Index::kPart, 1, 0.0},
-    {"joint_spring", P::kJoint, "springref", &mjModel::qpos_spring, Index::kPosition, 1, {}, HasSpring},
-    {"joint_dry_friction", P::kJoint, "frictionloss", &mjModel::dof_frictionloss, Index::kDof, 1, 0.0,
-     nullptr, kFreeJoint | kWheelJoint},
-    {"joint_limit_margin", P::kJoint, "margin", &mjModel::jnt_margin, Index::kPart, 1, 0.0, HasLimit},
-    {"motor_transmission", P::kActuator, "transmission", &mjModel::actuator_trntype, Index::kPart, 1,
+    {"joint_spring", P::kJoint, "stiffness", &mjModel::jnt_stiffness, I::kPart, 1, 0.0},
+    {"joint_spring", P::kJoint, "springref", &mjModel::qpos_spring, I::kPosition, 1, {}, HasSpring},
+    {"joint_dry_friction", P::kJoint, "frictionloss", &mjModel::dof_frictionloss, I::kDof, 1, 0.0, nullptr,
+     kFreeJoint | kWheelJoint},
+    {"joint_limit_margin", P::kJoint, "margin", &mjModel::jnt_margin, I::kPart, 1, 0.0, HasLimit},
+    {"motor_transmission", P::kActuator, "transmission", &mjModel::actuator_trntype, I::kPart, 1,
      mjTRN_JOINT},
-    {"motor_transmission", P::kActuator, "gear", &mjModel::actuator_gear, Index::kPart, 6, 1.0},
-    {"motor_dynamics", P::kActuator, "dyntype", &mjModel::actuator_dyntype, Index::kPart, 1, mjDYN_NONE},
-    {"motor_dynamics", P::kActuator, "dynprm", &mjModel::actuator_dynprm, Index::kPart, mjNDYN},
-    {"motor_gain", P::kActuator, "gaintype", &mjModel::actuator_gaintype, Index::kPart, 1, mjGAIN_FIXED},
-    {"motor_gain", P::kActuator, "gainprm", &mjModel::actuator_gainprm, Index::kPart, mjNGAIN, 1.0},
-    {"motor_bias", P::kActuator, "biastype", &mjModel::actuator_biastype, Index::kPart, 1, mjBIAS_NONE},
-    {"motor_bias", P::kActuator, "biasprm", &mjModel::actuator_biasprm, Index::kPart, mjNBIAS},
-    {"motor_limit",
-     P::kActuator,
-     "ctrlrange",
-     &mjModel::actuator_ctrlrange,
-     Index::kPart,
-     2,
-     {},
-     LimitsControl},
-    {"motor_limit",
-     P::kActuator,
-     "forcerange",
-     &mjModel::actuator_forcerange,
-     Index::kPart,
-     2,
-     {},
-     LimitsForce},
-    {"tendon_spring", P::kTendon, "stiffness", &mjModel::tendon_stiffness, Index::kPart, 1, 0.0},
-    {"tendon_spring", P::kTendon, "springlength", &mjModel::tendon_lengthspring, Index::kPart, 2},
-    {"tendon_damping", P::kTendon, "damping", &mjModel::tendon_damping, Index::kPart, 1, 0.0},
-    {"tendon_friction", P::kTendon, "frictionloss", &mjModel::tendon_frictionloss, Index::kPart, 1, 0.0},
-    {"tendon_limit", P::kTendon, "limited", &mjModel::tendon_limited, Index::kPart, 1, 0.0},
-    {"tendon_limit", P::kTendon, "range", &mjModel::tendon_range, Index::kPart, 2},
+    {"motor_transmission", P::kActuator, "gear", &mjModel::actuator_gear, I::kPart, 6, 1.0},
+    {"motor_dynamics", P::kActuator, "dyntype", &mjModel::actuator_dyntype, I::kPart, 1, mjDYN_NONE},
+    {"motor_dynamics", P::kActuator, "dynprm", &mjModel::actuator_dynprm, I::kPart, mjNDYN},
+    {"motor_gain", P::kActuator, "gaintype", &mjModel::actuator_gaintype, I::kPart, 1, mjGAIN_FIXED},
+    {"motor_gain", P::kActuator, "gainprm", &mjModel::actuator_gainprm, I::kPart, mjNGAIN, 1.0},
+    {"motor_bias", P::kActuator, "biastype", &mjModel::actuator_biastype, I::kPart, 1, mjBIAS_NONE},
+    {"motor_bias", P::kActuator, "biasprm", &mjModel::actuator_biasprm, I::kPart, mjNBIAS},
+    {"motor_limit", P::kActuator, "ctrlrange", &mjModel::actuator_ctrlrange, I::kPart, 2, {}, LimitsControl},
+    {"motor_limit", P::kActuator, "forcerange", &mjModel::actuator_forcerange, I::kPart, 2, {}, LimitsForce},
+    {"tendon_spring", P::kTendon, "stiffness", &mjModel::tendon_stiffness, I::kPart, 1, 0.0},
+    {"tendon_spring", P::kTendon, "springlength", &mjModel::tendon_lengthspring, I::kPart, 2},
+    {"tendon_damping", P::kTendon, "damping", &mjModel::tendon_damping, I::kPart, 1, 0.0},
+    {"tendon_friction", P::kTendon, "frictionloss", &mjModel::tendon_frictionloss, I::kPart, 1, 0.0},
+    {"tendon_limit", P::kTendon, "limited", &mjModel::tendon_limited, I::kPart, 1, 0.0},
+    {"tendon_limit", P::kTendon, "range", &mjModel::tendon_range, I::kPart, 2},
     {"equality_constraint", P::kConstraint, "type", &mjModel::eq_type},
-    {"equality_constraint", P::kConstraint, "active", kEqualityActive, Index::kPart, 1, 0.0},
-    {"equality_constraint", P::kConstraint, "data", &mjModel::eq_data, Index::kPart, mjNEQDATA}};
+    {"equality_constraint", P::kConstraint, "active", kEqualityActive, I::kPart, 1, 0.0},
+    {"equality_constraint", P::kConstraint, "data", &mjModel::eq_data, I::kPart, mjNEQDATA}};
 
 /// First entry of a part's numbers in the array, and how many they are.
 std::pair<int, int> FindNumbers(const Constant& constant, const mjModel& m, int part) {
   constexpr int kPositions[] = {7, 4, 1, 1};  // of a free joint, a ball, a slide, a hinge
   constexpr int kDofs[] = {6, 3, 1, 1};
   switch (constant.index) {
-    case Index::kPosition:
+    case I::kPosition:
       return {m.jnt_qposadr[part], kPositions[m.jnt_type[part]]};
-    case Index::kDof:
+    case I::kDof:
       return {m.jnt_dofadr[part], kDofs[m.jnt_type[part]]};
-    case Index::kPart:
+    case I::kPart:
       break;
   }
   return {constant.count * part, constant.count};
@@ -114,7 +99,7 @@ void MakeIdle(PartKind kind, int id, unsigned role, mjModel* m) {
   for (const Constant& constant : ListConstants()) {
     if (constant.part != kind || (constant.roles & role) == 0 || !constant.neutral) continue;
     const auto [first, count] = FindNumbers(constant, *m, id);
-    const int changed = constant.index == Index::kPart ? 1 : count;
+    const int changed = constant.index == I::kPart ? 1 : count;
     std::visit(
         [&, at = first](auto array) {
           using Number = std::remove_pointer_t<std::remove_reference_t<decltype(m->*array)>>;

@@ -100,17 +100,11 @@ struct ColumnInfo {
   const char* other;  ///< Also called so.
   Kind kind;
 };
-constexpr std::array<ColumnInfo, kColumnCount> kColumns = {{{"link", "name", Kind::kNone},
-                                                            {"mass", "m", Kind::kMass},
-                                                            {"comx", "x", Kind::kLength},
-                                                            {"comy", "y", Kind::kLength},
-                                                            {"comz", "z", Kind::kLength},
-                                                            {"ixx", "lxx", Kind::kInertia},
-                                                            {"iyy", "lyy", Kind::kInertia},
-                                                            {"izz", "lzz", Kind::kInertia},
-                                                            {"ixy", "lxy", Kind::kInertia},
-                                                            {"ixz", "lxz", Kind::kInertia},
-                                                            {"iyz", "lyz", Kind::kInertia}}};
+constexpr ColumnInfo kColumns[kColumnCount] = {
+    {"link", "name", Kind::kNone},  {"mass", "m", Kind::kMass},     {"comx", "x", Kind::kLength},
+    {"comy", "y", Kind::kLength},   {"comz", "z", Kind::kLength},   {"ixx", "lxx", Kind::kInertia},
+    {"iyy", "lyy", Kind::kInertia}, {"izz", "lzz", Kind::kInertia}, {"ixy", "lxy", Kind::kInertia},
+    {"ixz", "lxz", Kind::kInertia}, {"iyz", "lyz", Kind::kInertia}};
 
 struct Unit {
   const char* name;
@@ -193,8 +187,8 @@ class BodyTableReader {
       const std::string name = SimplifyName(cells[i].substr(0, open));
       const auto* const column = std::ranges::find_if(
           kColumns, [&](const ColumnInfo& info) { return name == info.name || name == info.other; });
-      if (column == kColumns.end()) continue;  // a column of no interest
-      const auto k = static_cast<size_t>(column - kColumns.begin());
+      if (column == std::end(kColumns)) continue;  // a column of no interest
+      const auto k = static_cast<size_t>(column - kColumns);
       double& unit = units[static_cast<size_t>(column->kind)];
       if (open != std::string::npos && column->kind != Kind::kNone) {
         const std::string text = cells[i].substr(open + 1, cells[i].find_first_of("])") - open - 1);
@@ -205,7 +199,7 @@ class BodyTableReader {
       index_[k] = static_cast<int>(i);
       units_[k] = unit;
     }
-    for (size_t k = 0; k < kColumns.size(); ++k) {
+    for (size_t k = 0; k < kColumnCount; ++k) {
       if (index_[k] < 0) Fail(std::string("header: lacks column ") + kColumns[k].name);
     }
   }
