@@ -69,8 +69,7 @@ StatedConstants ReadStated(const RobotDescription& robot, const RobotSpec& refer
       if (!(own.*ListDescribedConstants()[k].states)) one.numbers[k].reset();
     }
     if (!own.states_range) one.range.reset();
-    if (one.coupling)
-      one.coupling->leader = static_cast<int>(std::ranges::find(order, one.coupling->leader) - order.begin());
+    if (one.coupling) one.coupling->leader = IndexOf(order, one.coupling->leader);
     one.forces = own.forces;
     one.wheel_radius = FindWheelRadius(robot, joint);
   }
@@ -126,8 +125,7 @@ constexpr QuantityWords kQuantities[] = {
     {"wheel_spin_inertia", "spin inertia", "kg m^2", "kg m^2"}};
 
 const QuantityWords* FindWords(const std::string& check) {
-  const auto* const found = std::ranges::find(kQuantities, std::string_view(check), &QuantityWords::check);
-  return found == std::end(kQuantities) ? nullptr : found;
+  return FindIn(kQuantities, std::string_view(check), &QuantityWords::check);
 }
 
 }  // namespace
@@ -174,9 +172,9 @@ void ConstantChecks::Add(ConstantFinding finding) {
 void StatedConstants::LeaveOut(const std::vector<std::string>& ignore) {
   for (OfJoint& joint : joints) {
     for (size_t k = 0; k < joint.numbers.size(); ++k) {
-      if (Ignores(ListDescribedConstants()[k].word, ignore)) joint.numbers[k].reset();
+      if (Contains(ignore, ListDescribedConstants()[k].word)) joint.numbers[k].reset();
     }
-    if (Ignores("coupling", ignore)) joint.coupling.reset();
+    if (Contains(ignore, "coupling")) joint.coupling.reset();
   }
 }
 
@@ -300,8 +298,8 @@ std::vector<std::string> CompareShapes(const RobotDescription& a, const RobotDes
   };
   std::vector<std::string> differing;
   for (const DescribedPart& part : a.parts) {
-    const auto other = std::ranges::find(b.parts, part.name, &DescribedPart::name);
-    if (other == b.parts.end()) continue;
+    const DescribedPart* const other = FindIn(b.parts, part.name, &DescribedPart::name);
+    if (other == nullptr) continue;
     const double volume = sum(part), there = sum(*other);
     if (volume > 0.0 && there > 0.0 && std::abs(volume - there) > kSame * Worst(volume, there))
       differing.push_back(fmt::format("{} ({:.4g} against {:.4g} m^3)", part.name, volume, there));
@@ -316,12 +314,12 @@ std::vector<std::string> CompareWithoutEffect(const RobotDescription& a, const R
   const auto differs = [](double x, double y) { return std::abs(x - y) > kSame * Worst(x, y); };
   std::vector<std::string> lines, limits;
   for (size_t i = 0; i < a.joints.size(); ++i) {
-    const auto other = std::ranges::find(b.spec.joints, a.spec.joints[i].name, &Joint::name);
-    if (other == b.spec.joints.end()) continue;
-    const double own = a.joints[i].velocity_limit;
-    const double there = b.joints[static_cast<size_t>(other - b.spec.joints.begin())].velocity_limit;
+    const int other = IndexOf(b.spec.joints, a.spec.joints[i].name, &Joint::name);
+    if (other < 0) continue;
+    const double own = a.joints[i].velocity_limit,
+                 there = b.joints[static_cast<size_t>(other)].velocity_limit;
     if (own > 0.0 && there > 0.0 && differs(own, there))
-      limits.push_back(fmt::format("{} ({:.6g} against {:.6g})", other->name, own, there));
+      limits.push_back(fmt::format("{} ({:.6g} against {:.6g})", a.spec.joints[i].name, own, there));
   }
   if (!limits.empty()) lines.push_back("velocity limits: " + JoinNames(limits));
 
@@ -366,43 +364,30 @@ double CalcGyration(const MassProperties& body) {
   return std::sqrt(body.inertia.trace() / (2.0 * body.mass));
 }
 
-class BodyComparison : public ConstantComparison {
- public:
-  BodyComparison(const RobotModel& model, ConstantChecks* result) : ConstantComparison(model, result) {}
-
-  void CompareLink(int link, const MassProperties& a, const MassProperties& b) {
-    constexpr std::pair<int, int> kEntries[] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
-    if (a.mass <= 0.0 || b.mass <= 0.0) return;
-    const double length = Worst(CalcGyration(a), a.com.norm(), b.com.norm());
-    for (int k = 0; k < 3; ++k) Compare("link_com", AtLink(link), a.com[k], b.com[k], length);
-    const double inertia = Worst(MaxAbs(a.inertia), MaxAbs(b.inertia));
-    for (const auto& [row, col] : kEntries)
-      Compare("link_inertia", AtLink(link), a.inertia(row, col), b.inertia(row, col), inertia);
-  }
-};
-
-/// The joint that moves a body; none of what the description does not have. -1 is the base.
-std::optional<int> FindJointOf(const std::string& body, const RobotDescription& robot) {
-  const auto part = std::ranges::find(robot.parts, body, &DescribedPart::name);
-  return part == robot.parts.end() ? std::nullopt : std::optional(part->joint);
-}
-
 }  // namespace
 
 ConstantChecks CompareBodies(const RobotDescription& a, const RobotDescription& b,
                              const std::vector<Pose>& X_ab) {
   ConstantChecks result;
   const RobotModel model(a.spec);
-  BodyComparison comparison(model, &result);
-  if (a.spec.base.type == BaseType::kFloating) comparison.CompareLink(-1, a.spec.base.body, b.spec.base.body);
+  ConstantComparison comparison(model, &result);
+  const auto compare = [&](int link, const MassProperties& own, const MassProperties& other) {
+    if (own.mass <= 0.0 || other.mass <= 0.0) return;
+    const double length = Worst(CalcGyration(own), own.com.norm(), other.com.norm());
+    for (int k = 0; k < 3; ++k)
+      comparison.Compare("link_com", AtLink(link), own.com[k], other.com[k], length);
+    const Vector6d I = ToEntries(own.inertia), I_other = ToEntries(other.inertia);
+    for (int k = 0; k < 6; ++k)
+      comparison.Compare("link_inertia", AtLink(link), I[k], I_other[k], Worst(MaxAbs(I), MaxAbs(I_other)));
+  };
+  if (a.spec.base.type == BaseType::kFloating) compare(-1, a.spec.base.body, b.spec.base.body);
   const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
   const std::vector<JointInLinkFrames> rows_a = ListJointsInLinkFrames(a);
   const std::vector<JointInLinkFrames> rows_b = ListJointsInLinkFrames(b);
   for (size_t i = 0; i < rows_a.size(); ++i) {
     if (b_of_a[i] < 0) continue;
     const MassProperties& other = rows_b[static_cast<size_t>(b_of_a[i])].body;
-    comparison.CompareLink(static_cast<int>(i), rows_a[i].body,
-                           X_ab.empty() ? other : ExpressIn(other, X_ab[i]));
+    compare(static_cast<int>(i), rows_a[i].body, X_ab.empty() ? other : ExpressIn(other, X_ab[i]));
   }
   return result;
 }
@@ -424,10 +409,11 @@ void NameCompiledChanges(const std::vector<CompiledChange>& changes,
                     fmt::join(change.made, ", "), is_mass ? "kg" : "kg m^2");
     const auto [line, is_new] = first_of.emplace(change.setting, std::pair(effect, 0));
     line->second.second += is_new ? 0 : 1;
-    const std::optional<int> joint = FindJointOf(change.body, own);
-    if (!joint || (*joint >= 0 && match[static_cast<size_t>(*joint)] < 0)) continue;
-    const int joint_there = *joint < 0 ? -1 : match[static_cast<size_t>(*joint)];
-    const int joint_first = side == 0 ? *joint : joint_there;
+    const DescribedPart* const part = FindIn(own.parts, change.body, &DescribedPart::name);
+    if (part == nullptr) continue;
+    const int joint_there = part->joint < 0 ? -1 : match[static_cast<size_t>(part->joint)];
+    if (part->joint >= 0 && joint_there < 0) continue;
+    const int joint_first = side == 0 ? part->joint : joint_there;
     const std::string where = "link " + LinkOf(robots[0]->spec, joint_first);
     if (is_mass) {
       for (ConstantFinding& finding : constants->findings) {

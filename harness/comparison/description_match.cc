@@ -35,7 +35,7 @@ class Matching {
     TakeGravity();
     TakeNames();
     for (const DescribedConstant& constant : ListDescribedConstants())
-      Ignores(constant.word, ignore_) ? Ignore(constant) : Take(constant);
+      Contains(ignore_, constant.word) ? Ignore(constant) : Take(constant);
     IgnoreAll("coupling", [](Joint* joint, DescribedJoint*) { joint->coupling.reset(); });
     IgnoreAll("effort", [](Joint*, DescribedJoint* joint) { joint->forces.reset(); });
     TakeRanges();
@@ -146,7 +146,7 @@ class Matching {
   /// @param forget takes what the word means out of a joint.
   template <typename Forget>
   void IgnoreAll(const std::string& word, const Forget& forget) {
-    if (!Ignores(word, ignore_)) return;
+    if (!Contains(ignore_, word)) return;
     for (RobotDescription* const robot : {&a_, &b_}) {
       for (size_t i = 0; i < robot->joints.size(); ++i) forget(&robot->spec.joints[i], &robot->joints[i]);
     }
@@ -197,10 +197,6 @@ class Matching {
 
 }  // namespace
 
-bool Ignores(const std::string& word, const std::vector<std::string>& ignore) {
-  return std::ranges::find(ignore, word) != ignore.end();
-}
-
 Completion CompleteEachOther(RobotDescription* a, RobotDescription* b,
                              const std::vector<std::string>& ignore) {
   const std::vector<std::string> renamed = TakeJointNames(*a, b);
@@ -245,7 +241,7 @@ Completion CompletePair(const std::vector<std::string>& ignore, const RobotPart&
 
 void TakeIgnored(const RobotSpec& robot, const std::vector<std::string>& ignore, mjModel* engine) {
   for (const DescribedConstant& constant : ListDescribedConstants()) {
-    if (!Ignores(constant.word, ignore)) continue;
+    if (!Contains(ignore, constant.word)) continue;
     for (const Joint& joint : robot.joints) {
       const int id = FindByName(*engine, mjOBJ_JOINT, joint.name);
       if (id < 0) continue;

@@ -13,9 +13,6 @@
 
 namespace dexcheck {
 
-/// Whether a word of kIgnorable is among them.
-bool Ignores(const std::string& word, const std::vector<std::string>& ignore);
-
 /// Constants that one of two descriptions took from the other.
 struct Completion {
   std::vector<std::string> notes;         ///< One line each: what was done.

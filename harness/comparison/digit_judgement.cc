@@ -27,7 +27,7 @@ constexpr Term kCauses[] = {Term::kJointAxis, Term::kFramePose};
 // The engine finds the principal moments of a tensor to this fraction of the largest.
 constexpr double kDiagonalisation = 1e-6;
 
-bool IsCause(Term term) { return std::ranges::find(kCauses, term) != std::end(kCauses); }
+bool IsCause(Term term) { return Contains(kCauses, term); }
 
 /// Check, kind of part, name and index of the number that a constant check compares.
 using ConstantKey = std::tuple<std::string, Location::Kind, std::string, int>;
@@ -42,20 +42,11 @@ ConstantKey KeyOf(const ConstantFinding& finding, const RobotSpec& spec) {
 /// Lists the constants and bodies in which two descriptions differ.
 std::vector<ConstantFinding> ListDifferentNumbers(const RobotDescription& a, const RobotDescription& b) {
   std::vector<ConstantFinding> findings = CheckConstants(a, b).findings;
-  const std::vector<ConstantFinding> bodies = CompareBodies(a, b).findings;
-  findings.insert(findings.end(), bodies.begin(), bodies.end());
+  Append(CompareBodies(a, b).findings, &findings);
   return findings;
 }
 
-/// Both files' descriptions brought to the same statements, one of them with its numbers moved.
-struct MovedPair {
-  MovedPair(RobotDescription first, RobotDescription second, const std::vector<std::string>& ignore,
-            const RobotPart& part)
-      : sides{std::move(first), std::move(second)} {
-    CompletePair(ignore, part, &sides);
-  }
-  std::array<RobotDescription, 2> sides;
-};
+using Sides = std::array<RobotDescription, 2>;
 
 /// One file with moved numbers: a provider for each draw, and the changes of its constants.
 class MovedFile {
@@ -63,16 +54,17 @@ class MovedFile {
   MovedFile(const PrintedSpread& own, const RobotDescription& other, size_t side,
             const std::vector<std::string>& ignore, const RobotPart& part, const RobotModel& model)
       : side_(side), other_(other), ignore_(ignore), part_(part), model_(model) {
-    nominal_.emplace(Complete(own.nominal));
-    const MovedPair& nominal = *nominal_;
-    spread_.nominal = MakeCopy(nominal);
+    nominal_ = Complete(own.nominal);
+    spread_.nominal = MakeCopy(nominal_);
     for (const RobotDescription& draw : own.draws) {
-      const MovedPair moved = Complete(draw);
-      const std::optional<TermComparison::Copy> copy = TryToCopy(moved);
-      if (!copy) continue;
-      spread_.draws.push_back(*copy);
-      for (const ConstantFinding& finding : ListDifferentNumbers(nominal.sides[side_], moved.sides[side_])) {
-        double& open = constants_[KeyOf(finding, nominal.sides[side_].spec)];
+      const Sides moved = Complete(draw);
+      try {
+        spread_.draws.push_back(MakeCopy(moved));
+      } catch (const InputError&) {
+        continue;  // a moved tensor of few digits has negative moments
+      }
+      for (const ConstantFinding& finding : ListDifferentNumbers(nominal_[side_], moved[side_])) {
+        double& open = constants_[KeyOf(finding, nominal_[side_].spec)];
         open = Worst(open, std::abs(finding.model - finding.engine));
       }
     }
@@ -80,41 +72,34 @@ class MovedFile {
   }
 
   [[nodiscard]] const TermComparison::Spread& spread() const { return spread_; }
-  [[nodiscard]] const MovedPair& nominal() const { return *nominal_; }
+  [[nodiscard]] const Sides& nominal() const { return nominal_; }
   [[nodiscard]] double FindOpen(const ConstantKey& key) const {
     const auto found = constants_.find(key);
     return found == constants_.end() ? 0.0 : found->second;
   }
 
  private:
-  [[nodiscard]] MovedPair Complete(const RobotDescription& own) const {
-    return side_ == 0 ? MovedPair(own, other_, ignore_, part_) : MovedPair(other_, own, ignore_, part_);
+  /// Both files' descriptions brought to the same statements, one of them with its numbers moved.
+  [[nodiscard]] Sides Complete(const RobotDescription& own) const {
+    Sides sides = side_ == 0 ? Sides{own, other_} : Sides{other_, own};
+    CompletePair(ignore_, part_, &sides);
+    return sides;
   }
 
   /// The engine's diagonalised tensor is as good as the file's. A larger change is no rounding.
   void TakeDiagonalisation(const RobotDescription& stated) {
-    const MovedPair pair = Complete(stated);
-    const ConstantChecks bodies = CompareBodies(nominal_->sides[side_], pair.sides[side_]);
+    const Sides sides = Complete(stated);
+    const ConstantChecks bodies = CompareBodies(nominal_[side_], sides[side_]);
     const bool is_small = std::ranges::all_of(
         bodies.records, [](const CheckRecord& record) { return record.worst <= kDiagonalisation; });
     if (!is_small) return;
-    spread_.others.push_back(MakeCopy(pair));
+    spread_.others.push_back(MakeCopy(sides));
     for (const ConstantFinding& finding : bodies.findings)
-      constants_[KeyOf(finding, nominal_->sides[side_].spec)] += std::abs(finding.model - finding.engine);
+      constants_[KeyOf(finding, nominal_[side_].spec)] += std::abs(finding.model - finding.engine);
   }
 
-  TermComparison::Copy MakeCopy(const MovedPair& pair) {
-    DynamicsProvider* const first = MakeProvider(pair.sides[0]);
-    return {first, MakeProvider(pair.sides[1])};
-  }
-
-  /// Returns nothing where a moved tensor of few digits has negative moments.
-  std::optional<TermComparison::Copy> TryToCopy(const MovedPair& pair) {
-    try {
-      return MakeCopy(pair);
-    } catch (const InputError&) {
-      return std::nullopt;
-    }
+  TermComparison::Copy MakeCopy(const Sides& sides) {
+    return {MakeProvider(sides[0]), MakeProvider(sides[1])};
   }
 
   DynamicsProvider* MakeProvider(const RobotDescription& robot) {
@@ -132,7 +117,7 @@ class MovedFile {
   const std::vector<std::string>& ignore_;
   const RobotPart& part_;
   const RobotModel& model_;
-  std::optional<MovedPair> nominal_;
+  Sides nominal_;
   std::vector<std::unique_ptr<RobotModel>> models_;
   std::vector<std::unique_ptr<AnalyticProvider>> providers_;
   TermComparison::Spread spread_{};
@@ -164,11 +149,11 @@ class DigitJudge {
   /// Judges the numbers of bodies in their links' frames: as if the two files had the same frames, and as the
   /// frames stand with all joints at zero. Of each link the better one counts.
   void JudgeBodies() {
-    const MovedPair& pair = a_.nominal();
+    const Sides& sides = a_.nominal();
     std::array<std::map<int, std::vector<ConstantFinding>>, 2> found;
-    const std::vector<Pose> choices[] = {{}, PlaceLinkFrames(pair.sides[0], pair.sides[1])};
+    const std::vector<Pose> choices[] = {{}, PlaceLinkFrames(sides[0], sides[1])};
     for (size_t i = 0; i < 2; ++i) {
-      for (const ConstantFinding& finding : CompareBodies(pair.sides[0], pair.sides[1], choices[i]).findings)
+      for (const ConstantFinding& finding : CompareBodies(sides[0], sides[1], choices[i]).findings)
         found[i][finding.location.first].push_back(finding);
     }
     const auto find_worst = [&](const std::vector<ConstantFinding>& findings) {
@@ -194,8 +179,8 @@ class DigitJudge {
     }
     for (size_t i = 0; i < comparison.records().size(); ++i) {
       const CheckRecord& judged = comparison.records()[i];
-      const auto record = std::ranges::find(*terms, judged.name, &CheckRecord::name);
-      if (record == terms->end() || !record->failed) continue;
+      CheckRecord* const record = FindIn(*terms, judged.name, &CheckRecord::name);
+      if (record == nullptr || !record->failed) continue;
       RaiseTo(judged.worst, &verdict_.units[record->name]);
       record->failed = judged.failed || failed_bodies_.contains(record->name) || too_loose == i;
       if (!judged.failed) continue;

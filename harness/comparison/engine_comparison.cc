@@ -133,14 +133,14 @@ class EngineComparisonRun {
 
  private:
   [[nodiscard]] bool IsWanted(const std::string& name) const {
-    return options_.engines.empty() || std::ranges::find(options_.engines, name) != options_.engines.end();
+    return options_.engines.empty() || Contains(options_.engines, name);
   }
 
   void CheckNames() const {
     std::vector<std::string> known;
     for (const EngineComparisonEngine& engine : ListEngineComparisonEngines()) known.push_back(engine.name);
     for (const std::string& name : options_.engines) {
-      if (std::ranges::find(known, name) != known.end()) continue;
+      if (Contains(known, name)) continue;
       throw InputError("--engines: must be of " + JoinNames(known) + ", got " + Quote(name));
     }
     for (const std::string& program : options_.programs) {
@@ -266,13 +266,13 @@ class EngineComparisonRun {
     double largest = 0.0;
     for (size_t i = 0; i < completed.spec.joints.size(); ++i) {
       Joint& joint = completed.spec.joints[i];
-      const auto other = std::ranges::find(compiled.spec.joints, joint.name, &Joint::name);
-      if (other == compiled.spec.joints.end()) return;
-      const auto j = static_cast<size_t>(other - compiled.spec.joints.begin());
+      const int other = IndexOf(compiled.spec.joints, joint.name, &Joint::name);
+      if (other < 0) return;
+      const auto j = static_cast<size_t>(other);
       // The bodies are moved from the compiled joint's frame to the link's own, through the frame that both
       // have.
-      const MassProperties body =
-          ExpressIn(other->body, completed.joints[i].X_iL * compiled.joints[j].X_iL.inverse());
+      const MassProperties body = ExpressIn(compiled.spec.joints[j].body,
+                                            completed.joints[i].X_iL * compiled.joints[j].X_iL.inverse());
       const double size = joint.body.inertia.norm();
       if (size > 0.0) largest = Worst(largest, (body.inertia - joint.body.inertia).norm() / size);
       joint.body = body;
@@ -287,7 +287,7 @@ class EngineComparisonRun {
     constexpr const char* kChecks[] = {"joint_spring", "tendon_spring", "tendon_damping", "fluid"};
     std::vector<std::string> parts;
     for (const ConstantFinding& finding : CheckConstants(adapter).findings) {
-      if (std::ranges::find(kChecks, finding.check) == std::end(kChecks)) continue;
+      if (!Contains(kChecks, finding.check)) continue;
       std::string part = finding.check;
       std::ranges::replace(part, '_', ' ');
       parts.push_back(part + (finding.where.empty() ? "" : " of " + finding.where));

@@ -42,10 +42,7 @@ StatedConstants ReadStated(const Adapter& adapter) {
     // Without a limit the range of the other side only says where to draw states.
     if (m.jnt_limited[id] != 0) one.range = {m.jnt_range[2 * id], m.jnt_range[2 * id + 1]};
     one.coupling = FindEngineCoupling(m, id);
-    if (!one.coupling) continue;
-    const auto leader = std::ranges::find(adapter.joint_ids(), one.coupling->leader);
-    one.coupling->leader =
-        leader == adapter.joint_ids().end() ? -1 : static_cast<int>(leader - adapter.joint_ids().begin());
+    if (one.coupling) one.coupling->leader = IndexOf(adapter.joint_ids(), one.coupling->leader);
   }
   return stated;
 }
@@ -109,11 +106,10 @@ class PlantComparison : public ConstantComparison {
     for (int geom = 0; geom < engine_.ngeom; ++geom) {
       if (engine_.geom_bodyid[geom] != engine_.site_bodyid[site] || engine_.geom_type[geom] != mjGEOM_CAPSULE)
         continue;
-      const mjtNum* const q = engine_.geom_quat + 4 * geom;
-      const Vector3d axis = Eigen::Quaterniond(q[0], q[1], q[2], q[3]) * Vector3d::UnitZ();
-      const Vector3d apart = MapVector(engine_.geom_pos + 3 * geom) - MapVector(engine_.site_pos + 3 * site);
-      const double half = engine_.geom_size[3 * geom + 1];
-      if (std::min((apart - half * axis).norm(), (apart + half * axis).norm()) < kSamePlace) return geom;
+      const Pose X = ReadPose(engine_.geom_pos + 3 * geom, engine_.geom_quat + 4 * geom);
+      const Vector3d apart = X.inverse() * MapVector(engine_.site_pos + 3 * site);
+      const Vector3d end(0.0, 0.0, engine_.geom_size[3 * geom + 1]);
+      if (std::min((apart - end).norm(), (apart + end).norm()) < kSamePlace) return geom;
     }
     return -1;
   }
@@ -191,10 +187,10 @@ class PlantComparison : public ConstantComparison {
     for (int k = 0; k < 3; ++k)
       Compare("object_shape", where, 0.0, engine_.geom_pos[3 * found + k], sizes[0]);
     if (type == mjGEOM_SPHERE) return;
-    mjtNum R[9];
-    mju_quat2Mat(R, engine_.geom_quat + 4 * found);
-    Compare("object_shape", where, 1.0, std::abs(R[8]));  // the axis, or a box's z
-    if (type == mjGEOM_BOX || type == mjGEOM_ELLIPSOID) Compare("object_shape", where, 1.0, std::abs(R[0]));
+    const Pose X = ReadPose(engine_.geom_pos + 3 * found, engine_.geom_quat + 4 * found);
+    Compare("object_shape", where, 1.0, std::abs(X(2, 2)));  // the axis, or a box's z
+    if (type == mjGEOM_BOX || type == mjGEOM_ELLIPSOID)
+      Compare("object_shape", where, 1.0, std::abs(X(0, 0)));
   }
 
   /// Sliding friction of the explicit contact pairs between a fingertip and the object. Without a pair the

@@ -15,12 +15,11 @@
 #include "harness/base/worst.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/exact_collision.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {
 namespace {
-
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 /// Hard fingers and wheels (20): a normal force and friction along the surface.
 constexpr int kHardContact = 3;
@@ -140,10 +139,7 @@ class ContactReader {
     const MjDataPtr data = MakeDataWithoutContacts(engine_);
     mj_kinematics(&engine_, data.get());
     const auto place = [&](int geom) {
-      return Vector3d(Eigen::Map<const Vector3d>(data->geom_xpos + 3 * geom));
-    };
-    const auto axis = [&](int geom) {
-      return Vector3d(Eigen::Map<const RowMatrix3d>(data->geom_xmat + 9 * geom).col(2));
+      return MapPose(data->geom_xmat + 9 * geom, data->geom_xpos + 3 * geom);
     };
     const auto add = [&](const char* check, int geom, double expected, double value, double tolerance) {
       EnginePart& part = list_.parts.emplace_back(EnginePart{"shape " + GeomName(geom), "", GeomName(geom)});
@@ -154,13 +150,16 @@ class ContactReader {
       const double tolerance = kConstantRounding * Worst(1.0, center.norm());
       for (int geom = 0; geom < engine_.ngeom; ++geom) {
         if (engine_.geom_bodyid[geom] != engine_.jnt_bodyid[wheel.joint] || !Touches(geom)) continue;
-        add("wheel_geom_place", geom, 0.0, (place(geom) - center).norm(), tolerance);
+        add("wheel_geom_place", geom, 0.0, (place(geom).translation() - center).norm(), tolerance);
         if (engine_.geom_type[geom] != mjGEOM_SPHERE)
-          add("wheel_geom_place", geom, 1.0, std::abs(axis(geom).dot(wheel.axis)), tolerance);
-        for (const int floor : FindFloors(geom)) {
-          add("floor_pose", floor, 1.0, axis(floor).z(), tolerance);
-          add("floor_pose", floor, 0.0, axis(floor).head<2>().norm(), tolerance);
-          add("floor_pose", floor, center.z() - wheel.radius, place(floor).z(), tolerance);
+          add("wheel_geom_place", geom, 1.0, std::abs(place(geom).linear().col(2).dot(wheel.axis)),
+              tolerance);
+        for (const int floor : ListPartners(geom)) {
+          if (engine_.geom_type[floor] != mjGEOM_PLANE) continue;
+          const Vector3d normal = place(floor).linear().col(2);
+          add("floor_pose", floor, 1.0, normal.z(), tolerance);
+          add("floor_pose", floor, 0.0, normal.head<2>().norm(), tolerance);
+          add("floor_pose", floor, center.z() - wheel.radius, place(floor).translation().z(), tolerance);
         }
       }
     }
@@ -168,23 +167,19 @@ class ContactReader {
 
   /// Whether a geom takes part in contacts as the option "collision" has it.
   [[nodiscard]] bool Touches(int geom) const {
-    bool touches = false;
-    for (int pair = 0; pair < engine_.npair; ++pair)
-      touches |= engine_.pair_geom1[pair] == geom || engine_.pair_geom2[pair] == geom;
     const bool by_type = engine_.geom_contype[geom] != 0 || engine_.geom_conaffinity[geom] != 0;
-    return (touches && CollidesByPair(engine_)) || (by_type && CollidesByType(engine_));
+    return (!ListPartners(geom).empty() && CollidesByPair(engine_)) || (by_type && CollidesByType(engine_));
   }
 
-  /// Planes that a geom has a contact pair with.
-  [[nodiscard]] std::set<int> FindFloors(int geom) const {
-    std::set<int> floors;
+  /// Geoms that a geom has a contact pair with.
+  [[nodiscard]] std::set<int> ListPartners(int geom) const {
+    std::set<int> partners;
     for (int pair = 0; pair < engine_.npair; ++pair) {
-      const int geoms[2] = {engine_.pair_geom1[pair], engine_.pair_geom2[pair]};
-      for (int k = 0; k < 2; ++k) {
-        if (geoms[k] == geom && engine_.geom_type[geoms[1 - k]] == mjGEOM_PLANE) floors.insert(geoms[1 - k]);
-      }
+      const int one = engine_.pair_geom1[pair], other = engine_.pair_geom2[pair];
+      if (one == geom) partners.insert(other);
+      if (other == geom) partners.insert(one);
     }
-    return floors;
+    return partners;
   }
 
   void NoteContactsByType() {

@@ -251,11 +251,6 @@ class PartReader {
   EngineParts list_;
 };
 
-const EnginePart* FindPart(const std::vector<EnginePart>& parts, const std::string& key) {
-  const auto found = std::ranges::find(parts, key, &EnginePart::key);
-  return found == parts.end() ? nullptr : &*found;
-}
-
 }  // namespace
 
 EngineParts ListEngineParts(const Adapter& adapter, const PartOptions& options) {
@@ -288,7 +283,7 @@ void CompareParts(const std::vector<EnginePart>& first, const std::vector<Engine
     }
   };
   for (const EnginePart& part : second) {
-    const EnginePart* const own = FindPart(first, part.key);
+    const EnginePart* const own = FindIn(first, part.key, &EnginePart::key);
     if (own == nullptr) {
       compare_alone(part, false);
       continue;
@@ -307,7 +302,7 @@ void CompareParts(const std::vector<EnginePart>& first, const std::vector<Engine
     }
   }
   for (const EnginePart& part : first) {
-    if (FindPart(second, part.key) == nullptr) compare_alone(part, true);
+    if (FindIn(second, part.key, &EnginePart::key) == nullptr) compare_alone(part, true);
   }
 }
 
@@ -317,7 +312,8 @@ std::vector<std::string> LeaveOutShared(const std::vector<EnginePart>& first,
   for (const EnginePart& part : second) {
     // Motors and constraints act on no term.
     const bool acts = part.kind == PartKind::kJoint || part.kind == PartKind::kTendon;
-    if (acts && FindPart(first, part.key) != nullptr) MakeIdle(*part.kind, part.id, part.role, engine);
+    if (acts && FindIn(first, part.key, &EnginePart::key) != nullptr)
+      MakeIdle(*part.kind, part.id, part.role, engine);
   }
   engine->opt.disableflags &= ~first_engine.opt.disableflags;
   engine->opt.enableflags &= ~first_engine.opt.enableflags;
@@ -349,7 +345,8 @@ std::vector<std::string> ListMotors(const std::vector<EnginePart>& own, const st
                                     bool is_shared) {
   std::vector<std::string> names;
   for (const EnginePart& part : own) {
-    if (part.kind == PartKind::kActuator && (FindPart(other, part.key) != nullptr) == is_shared)
+    if (part.kind == PartKind::kActuator &&
+        (FindIn(other, part.key, &EnginePart::key) != nullptr) == is_shared)
       names.push_back(part.name.substr(part.name.find(' ') + 1));
   }
   return names;

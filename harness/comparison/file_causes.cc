@@ -81,12 +81,6 @@ std::vector<NamedNumber> NameNumbers(const PrintedLink& link) {
   return numbers;
 }
 
-/// Returns the number of that name; none where there is none.
-std::optional<double> FindNumber(const std::vector<NamedNumber>& numbers, const std::string& quantity) {
-  const auto found = std::ranges::find(numbers, quantity, &NamedNumber::quantity);
-  return found == numbers.end() ? std::nullopt : std::optional(found->value);
-}
-
 /// Name of the vector or tensor that a number belongs to.
 std::string NameVector(const std::string& quantity) { return quantity.substr(0, quantity.rfind(' ')); }
 
@@ -114,11 +108,12 @@ std::vector<FileChange> ListChanges(const PrintedRobot& robot, const CorrectionI
                          number.quantity, number.unit, value, repair, size});
     };
     for (const NamedNumber& number : after) {
-      const std::optional<double> value = FindNumber(before, number.quantity);
-      if (value != number.value) add(number, value, number.value);
+      const NamedNumber* const was = FindIn(before, number.quantity, &NamedNumber::quantity);
+      if (was == nullptr) add(number, std::nullopt, number.value);
+      if (was != nullptr && was->value != number.value) add(number, was->value, number.value);
     }
     for (const NamedNumber& number : before) {
-      if (!FindNumber(after, number.quantity)) add(number, number.value, std::nullopt);
+      if (!Contains(after, number.quantity, &NamedNumber::quantity)) add(number, number.value, std::nullopt);
     }
   }
   return changes;
@@ -133,9 +128,9 @@ void LeaveOutUnstated(const std::vector<std::string>& ignore, PrintedRobot* robo
                                                             {"effort", JointScalar::kEffort}};
   for (PrintedLink& link : robot->links) {
     for (const auto& [word, scalar] : kWords) {
-      if (Ignores(word, ignore)) link.joint.scalars[static_cast<size_t>(scalar)].reset();
+      if (Contains(ignore, word)) link.joint.scalars[static_cast<size_t>(scalar)].reset();
     }
-    if (Ignores("coupling", ignore)) link.joint.mimic.reset();
+    if (Contains(ignore, "coupling")) link.joint.mimic.reset();
     for (const JointScalar limit : {JointScalar::kEffort, JointScalar::kVelocity}) {
       std::optional<PrintedScalar>& number = link.joint.scalars[static_cast<size_t>(limit)];
       if (number && number->value == 0.0) number.reset();
@@ -199,8 +194,7 @@ bool IsExplained(const std::string& check, const CorrectionItem& cause) {
   const auto kinds = kKindsOfChecks.find(check);
   return std::ranges::any_of(cause.sites, [&](const Site& site) {
     const bool is_of_tree = site.kind <= SiteKind::kType;
-    return is_of_tree || (kinds != kKindsOfChecks.end() &&
-                          std::ranges::find(kinds->second, site.kind) != kinds->second.end());
+    return is_of_tree || (kinds != kKindsOfChecks.end() && Contains(kinds->second, site.kind));
   });
 }
 

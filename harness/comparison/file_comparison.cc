@@ -29,10 +29,6 @@ namespace dexcheck {
 
 namespace {
 
-void AppendTo(std::vector<std::string>* notes, const std::vector<std::string>& more) {
-  notes->insert(notes->end(), more.begin(), more.end());
-}
-
 /// Notes the joints of a scene that are no part of the robot.
 void NoteOthers(const Adapter& adapter, Comparison* comparison) {
   std::vector<std::string> names;
@@ -151,10 +147,10 @@ std::vector<EnginePart> ListFirstParts(const DescriptionFile& first, const Engin
   EngineParts own = ListEngineParts(Adapter(model, *own_engine, first.path().string()), {false, true});
   const std::string file = first.path().filename(), other = comparison->second.filename();
   comparison->without_effect = CompareOptions(own_engine->opt, engine->opt, file, other);
-  AppendTo(&comparison->without_effect, CompareContacts(own.notes, parts.notes));
-  AppendTo(&comparison->without_effect, CompareMotorOrder(own.parts, parts.parts, file, other));
-  AppendTo(&comparison->not_compared, ListLoneMotors(own.parts, parts.parts, file, other));
-  AppendTo(&comparison->not_compared, LeaveOutShared(own.parts, parts.parts, *own_engine, engine));
+  Append(CompareContacts(own.notes, parts.notes), &comparison->without_effect);
+  Append(CompareMotorOrder(own.parts, parts.parts, file, other), &comparison->without_effect);
+  Append(ListLoneMotors(own.parts, parts.parts, file, other), &comparison->not_compared);
+  Append(LeaveOutShared(own.parts, parts.parts, *own_engine, engine), &comparison->not_compared);
   return std::move(own.parts);
 }
 
@@ -164,7 +160,7 @@ ConstantChecks CompareEngineConstants(const DescriptionFile& first, const FilePa
                                       mjModel* engine, Comparison* comparison) {
   const std::string file = comparison->second.filename().string();
   const EngineParts parts = ListEngineParts(
-      adapter, {first.format() == RobotFormat::kUrdf, true, Ignores("coupling", options.ignore)});
+      adapter, {first.format() == RobotFormat::kUrdf, true, Contains(options.ignore, "coupling")});
   if (!parts.motors.empty())
     comparison->not_compared.push_back("motors: only " + file +
                                        " says how they make their forces (servos, muscles, transmissions, "
@@ -173,7 +169,7 @@ ConstantChecks CompareEngineConstants(const DescriptionFile& first, const FilePa
   FirstFile stated{true, pair.second ? &pair.first : nullptr, options.ignore, file};
   if (first.format() == RobotFormat::kMjcf) stated.parts = ListFirstParts(first, parts, engine, comparison);
   ConstantChecks constants = CheckConstants(adapter, parts, stated);
-  AppendTo(&comparison->not_compared, constants.not_compared);
+  Append(constants.not_compared, &comparison->not_compared);
   return constants;
 }
 
@@ -208,14 +204,14 @@ void CompareTwo(const DescriptionFile& first, const DescriptionFile& second, con
   const bool is_whole = engine && first.format() == RobotFormat::kMjcf;
   const std::optional<RobotDescription>& other = engine ? comparison->read_second : pair.second;
   if (other) {
-    AppendTo(&comparison->without_effect, CompareWithoutEffect(robot, *other));
-    if (!is_whole) AppendTo(&comparison->without_effect, CompareShapes(robot, *other));
+    Append(CompareWithoutEffect(robot, *other), &comparison->without_effect);
+    if (!is_whole) Append(CompareShapes(robot, *other), &comparison->without_effect);
     if (engine) CompareBesideEngine({&first, &second}, {&robot, &*other}, comparison);
   }
-  if (!is_whole) AppendTo(&comparison->notes, robot.notes);
-  if (!engine) AppendTo(&comparison->notes, pair.second->notes);
-  AppendTo(&comparison->notes, completion.notes);
-  AppendTo(&comparison->not_compared, completion.not_compared);
+  if (!is_whole) Append(robot.notes, &comparison->notes);
+  if (!engine) Append(pair.second->notes, &comparison->notes);
+  Append(completion.notes, &comparison->notes);
+  Append(completion.not_compared, &comparison->not_compared);
   if (adapter) NoteOthers(*adapter, comparison);
   comparison->digits = JudgeByDigits({&first, &second}, urdf, options, &of_first, of_second.get(), model,
                                      options.part, &comparison->result);
@@ -400,7 +396,7 @@ Comparison CompareResults(const std::filesystem::path& file, const ResultsSource
     };
     provider = std::move(results);
   }
-  for (const std::string& note : DescribeCoordinates(reference.robot)) comparison.notes.push_back(note);
+  Append(DescribeCoordinates(reference.robot), &comparison.notes);
   comparison.result =
       CompareProviders(*comparison.model, reference.provider.get(), provider.get(), make_feed(), progress);
   if (!comparison.result.not_compared.empty())

@@ -52,7 +52,7 @@ Differences ListExcesses(const Comparison& comparison) {
   double most = 0.0;
   for (const ConstantFinding& excess : comparison.digits->excesses) {
     if (!excess.is_cause) {
-      if (std::ranges::find(following, excess.check) == following.end()) following.push_back(excess.check);
+      if (!Contains(following, excess.check)) following.push_back(excess.check);
       most = Worst(most, excess.units);
       continue;
     }
@@ -93,8 +93,8 @@ Differences SortDifferences(const Comparison& comparison) {
   for (const ConstantFinding& finding : comparison.result.constants.findings) {
     // The scale of a check may differ from the larger of the two numbers, where zero is a valid value.
     const double size = Worst(std::abs(finding.model), std::abs(finding.engine));
-    const auto check = std::ranges::find(checks, finding.check, &CheckRecord::name);
-    const double worst = check == checks.end() ? 1.0 : check->worst;
+    const CheckRecord* const check = FindIn(checks, finding.check, &CheckRecord::name);
+    const double worst = check == nullptr ? 1.0 : check->worst;
     add(std::min(std::abs(finding.model - finding.engine) / size, worst),
         DescribeFinding(finding, comparison));
   }
@@ -122,8 +122,7 @@ std::vector<std::string> ListOtherDifferences(const Comparison& comparison) {
   }
   for (const CheckRecord& record : comparison.result.terms) {
     constexpr const char* kOfNumbers[] = {"joint_axis", "frame_pose", "link_com", "link_inertia"};
-    const bool is_of_numbers = std::ranges::find(kOfNumbers, record.name) != std::end(kOfNumbers);
-    if (record.failed && is_of_numbers && !is_explained(record.name))
+    if (record.failed && Contains(kOfNumbers, record.name) && !is_explained(record.name))
       lines.push_back(record.name + ": " +
                       Describe(record.first_failure, model, model.num_base_velocities()));
   }
@@ -139,7 +138,7 @@ std::vector<std::string> ListDifferences(const Comparison& comparison) {
   }
   Differences differences = SortDifferences(comparison);
   std::vector<std::string> lines = std::move(differences.real);
-  lines.insert(lines.end(), differences.rounded.begin(), differences.rounded.end());
+  Append(differences.rounded, &lines);
   if (!differences.following.empty()) lines.push_back(differences.following);
   return lines;
 }

@@ -55,7 +55,7 @@ std::string ReplaceNumbers(std::string_view list, bool is_of_body, const Replace
 /// Whether an element is one of these names or stands in one.
 bool IsIn(const Element* element, std::initializer_list<std::string_view> names) {
   for (; element != nullptr; element = element->Parent()->ToElement()) {
-    if (std::ranges::find(names, element->Name()) != names.end()) return true;
+    if (Contains(names, std::string_view(element->Name()))) return true;
   }
   return false;
 }
@@ -65,7 +65,7 @@ void ReplaceInXml(Element* root, const Replace& replace) {
     if (IsIn(element, {"visual", "collision"})) return;
     const bool is_of_body = IsIn(element, {"inertial", "geom"});
     for (const tinyxml2::XMLAttribute* at = element->FirstAttribute(); at != nullptr; at = at->Next()) {
-      if (std::ranges::find(kAttributes, at->Name()) == std::end(kAttributes)) continue;
+      if (!Contains(kAttributes, std::string_view(at->Name()))) continue;
       element->SetAttribute(at->Name(), ReplaceNumbers(at->Value(), is_of_body, replace).c_str());
     }
   });
@@ -91,8 +91,7 @@ std::string ReplaceInToml(std::string_view text, const Replace& replace) {
     result += number ? replace({*number, is_of_body}, word) : std::string(word);
     text.remove_prefix(length);
     // The key that stands before its numbers.
-    if (!number && std::isalpha(static_cast<unsigned char>(first)) != 0)
-      is_of_body = std::ranges::find(kOfBody, word) != std::end(kOfBody);
+    if (!number && std::isalpha(static_cast<unsigned char>(first)) != 0) is_of_body = Contains(kOfBody, word);
   }
   return result;
 }
@@ -151,16 +150,13 @@ void ChangeParts(const mjModel& engine, const std::vector<const Element*>& inert
 
 /// By how much the six numbers of a fullinertia, or the three of a diaginertia, are moved.
 Matrix3d MoveTensor(const Element& inertial, const char* attribute, Mover* mover) {
-  constexpr std::pair<int, int> kEntries[] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {0, 2}, {1, 2}};
-  Matrix3d tensor = Matrix3d::Zero();
-  size_t k = 0;
+  Vector6d entries = Vector6d::Zero();
+  int k = 0;
   ReplaceNumbers(ReadAttribute(inertial, attribute), true, [&](const FileNumber& number, std::string_view) {
-    if (k == std::size(kEntries)) return std::string();
-    const auto [row, col] = kEntries[k++];
-    tensor(row, col) = tensor(col, row) = mover->Draw(number);
+    if (k < 6) entries[k++] = mover->Draw(number);
     return std::string();
   });
-  return tensor;
+  return ToTensor(entries);
 }
 
 /// One file's numbers: an MJCF's mechanism, or a URDF, parameter file or table of bodies as it stands.

@@ -186,9 +186,7 @@ MatrixXd TermComparison::CalcDifference(AskedTerm* term, size_t copy) const {
   return term->numbers[copy] - term->numbers[copy + 1];
 }
 
-bool TermComparison::IsCause(const AskedTerm& term) const {
-  return std::ranges::find(causes_, term.entry->term) != causes_.end();
-}
+bool TermComparison::IsCause(const AskedTerm& term) const { return Contains(causes_, term.entry->term); }
 
 void TermComparison::WidenByDraws(AskedTerm* term) const {
   constexpr double kCoverage = 3.0;  // times the root mean square of draws at the ends of the intervals

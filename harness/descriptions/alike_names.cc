@@ -15,23 +15,18 @@ namespace {
 
 using Names = std::vector<std::string>;
 
-size_t CountCommonPrefix(const Names& names) {
-  if (names.size() < 2) return 0;
-  size_t length = names[0].size();
-  for (const std::string& name : names) {
-    const auto [own, first] = std::mismatch(name.begin(), name.end(), names[0].begin(), names[0].end());
-    length = std::min(length, static_cast<size_t>(own - name.begin()));
-  }
-  return length;
-}
-
 Names Reverse(Names names) {
   for (std::string& name : names) std::ranges::reverse(name);
   return names;
 }
 
+/// The names without what all of several begin with.
 Names DropCommonPrefix(Names names) {
-  const size_t length = CountCommonPrefix(names);
+  size_t length = names.size() < 2 ? 0 : names[0].size();
+  for (const std::string& name : names) {
+    const auto same = std::ranges::mismatch(name, names[0]).in1;
+    length = std::min(length, static_cast<size_t>(same - name.begin()));
+  }
   for (std::string& name : names) name.erase(0, length);
   return names;
 }
@@ -48,12 +43,8 @@ std::vector<Names> ListVariants(const Names& names) {
 }  // namespace
 
 std::string SimplifyName(const std::string& name) {
-  std::string simple;
-  for (const char c : name) {
-    if (std::isalnum(static_cast<unsigned char>(c)) != 0) {
-      simple += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    }
-  }
+  std::string simple = ToLower(name);
+  std::erase_if(simple, [](unsigned char c) { return std::isalnum(c) == 0; });
   return simple;
 }
 

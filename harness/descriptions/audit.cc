@@ -195,9 +195,7 @@ class JointAudit {
   /// About an axis through the frame's origin, the one about which it is least, kg m^2.
   static double CalcLeastInertia(const MassProperties& body) {
     const Matrix3d about_origin = body.inertia + CalcPointInertia(body.mass, body.com);
-    return Eigen::SelfAdjointEigenSolver<Matrix3d>(about_origin, Eigen::EigenvaluesOnly)
-        .eigenvalues()
-        .minCoeff();
+    return CalcMoments(about_origin)[0];
   }
 
   /// Audits the mass that each joint moves.

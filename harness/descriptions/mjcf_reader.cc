@@ -244,9 +244,8 @@ class MjcfDescriptionReader {
     for (size_t i = 0; i < robot_.joints.size(); ++i) {
       std::optional<JointCoupling> coupling = FindEngineCoupling(engine_, joint_ids_[i]);
       if (!coupling) continue;
-      const auto leader = std::ranges::find(joint_ids_, coupling->leader);
-      if (leader == joint_ids_.end()) continue;
-      coupling->leader = static_cast<int>(leader - joint_ids_.begin());
+      coupling->leader = IndexOf(joint_ids_, coupling->leader);
+      if (coupling->leader < 0) continue;
       robot_.spec.joints[i].coupling = coupling;
       --other_equalities_;
     }
@@ -293,15 +292,13 @@ MassProperties ReadEngineBody(const mjModel& engine, int body) {
 std::string ReduceToMechanism(const MjcfFile& mjcf) {
   MjcfFile reduced(mjcf.PrintFor(CurrentFolder()), mjcf.source());
   tinyxml2::XMLElement* const root = reduced.root();
-  const auto keeps = [](std::string_view name, std::initializer_list<std::string_view> kept) {
-    return std::ranges::find(kept, name) != kept.end();
-  };
+  constexpr std::string_view kKept[] = {"compiler", "option",    "size",    "default",
+                                        "asset",    "worldbody", "equality"};
   bool uses_geoms = false;
   for (tinyxml2::XMLElement* child : ListChildren(root)) {
     const std::string_view name = child->Name();
     if (name == "compiler") uses_geoms = uses_geoms || ReadAttribute(*child, "inertiafromgeom") == "true";
-    if (!keeps(name, {"compiler", "option", "size", "default", "asset", "worldbody", "equality"}))
-      root->DeleteChild(child);
+    if (!Contains(kKept, name)) root->DeleteChild(child);
   }
   DeleteInSections(root, {"equality"}, [](const tinyxml2::XMLElement& child) {
     return std::string_view(child.Name()) != "joint";

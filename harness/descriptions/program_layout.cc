@@ -18,38 +18,36 @@ using Position = BaseConvention::Position;
   throw InputError(source + ": " + key + ": " + problem);
 }
 
-constexpr std::pair<const char*, Position> kPositions[] = {
-    {"xyz_wxyz", Position::kXyzWxyz}, {"xyz_xyzw", Position::kXyzXyzw}, {"wxyz_xyz", Position::kWxyzXyz}};
-
-/// Index of a key's word among those that it may have; 0 when the key is missing.
-size_t ReadChoice(const Json& table, const char* key, std::initializer_list<const char*> words,
-                  const std::string& source) {
-  if (!table.contains(key)) return 0;
-  size_t index = 0;
-  std::string list;
-  for (const char* word : words) {
-    if (table.at(key) == word) return index;
-    list += (index++ == 0 ? "" : ", ") + Quote(word);
-  }
-  Fail(source, std::string("base.") + key,
-       "must be one of " + list + ", got " + Abbreviate(table.at(key).dump()));
-}
+/// A key of `base`, and its words by the choices of a convention; the first is the default.
+struct BaseKey {
+  const char* name;
+  std::vector<std::string> words;
+};
+const BaseKey kBaseKeys[] = {{"position", {"xyz_wxyz", "xyz_xyzw", "wxyz_xyz"}},
+                             {"velocity", {"linear_angular", "angular_linear"}},
+                             {"linear_axes", {"world", "base"}},
+                             {"angular_axes", {"base", "world"}}};
 
 BaseConvention ReadConvention(const Json& table, const std::string& source) {
   if (!table.is_object()) Fail(source, "base", "must be an object, got " + Abbreviate(table.dump()));
+  size_t choices[std::size(kBaseKeys)] = {};
   for (const auto& item : table.items()) {
-    const std::string& key = item.key();
-    if (key == "position" || key == "velocity" || key == "linear_axes" || key == "angular_axes") continue;
-    Fail(source, "base." + Abbreviate(key),
-         "unknown key, known here are position, velocity, linear_axes, angular_axes");
+    const int key = IndexOf(kBaseKeys, std::string_view(item.key()), &BaseKey::name);
+    if (key < 0)
+      Fail(source, "base." + Abbreviate(item.key()),
+           "unknown key, known here are position, velocity, linear_axes, angular_axes");
+    const std::vector<std::string>& words = kBaseKeys[key].words;
+    const auto word =
+        std::ranges::find_if(words, [&](const std::string& one) { return item.value() == one; });
+    if (word == words.end()) {
+      std::string list;
+      for (const std::string& one : words) list += (list.empty() ? "" : ", ") + Quote(one);
+      Fail(source, "base." + item.key(),
+           "must be one of " + list + ", got " + Abbreviate(item.value().dump()));
+    }
+    choices[key] = static_cast<size_t>(word - words.begin());
   }
-  BaseConvention convention;
-  convention.position =
-      kPositions[ReadChoice(table, "position", {"xyz_wxyz", "xyz_xyzw", "wxyz_xyz"}, source)].second;
-  convention.angular_first = ReadChoice(table, "velocity", {"linear_angular", "angular_linear"}, source) == 1;
-  convention.linear_in_base = ReadChoice(table, "linear_axes", {"world", "base"}, source) == 1;
-  convention.angular_in_world = ReadChoice(table, "angular_axes", {"base", "world"}, source) == 1;
-  return convention;
+  return {static_cast<Position>(choices[0]), choices[1] == 1, choices[2] == 1, choices[3] == 1};
 }
 
 /// Reads a number, a list of n numbers, or a list of n such lists.
@@ -110,38 +108,29 @@ ProgramLayout::ProgramLayout(const RobotDescription& robot, const Json& json, co
   std::vector<std::string> names;
   for (const NamedJoint& joint : robot_joints_) names.push_back(joint.name);
   std::vector<int> joints;
-  std::vector<bool> is_named(names.size(), false);
   for (size_t i = 0; i < list.size(); ++i) {
     const std::string key = "joints[" + std::to_string(i) + "]";
     if (!list[i].is_string()) Fail(source, key, "must be a name, got " + Abbreviate(list[i].dump()));
     const std::string name = list[i].get<std::string>();
-    const auto found = std::ranges::find(names, name);
-    if (found == names.end()) {
+    const int found = IndexOf(names, name);
+    if (found < 0) {
       const std::string nearest = FindNearest(name, names);
       Fail(source, key,
            "must be a joint of " + robot.spec.source +
                (nearest.empty() ? "" : " (did you mean " + Quote(nearest) + "?)") + ", got " + Quote(name));
     }
-    const auto joint = static_cast<size_t>(found - names.begin());
-    if (is_named[joint]) Fail(source, key, "must be named once, got " + Quote(name) + " again");
-    is_named[joint] = true;
-    joints.push_back(static_cast<int>(joint));
+    if (Contains(joints, found)) Fail(source, key, "must be named once, got " + Quote(name) + " again");
+    joints.push_back(found);
   }
   SetJoints(std::move(joints));
-  std::vector<std::string> missing;
-  size_t followers = 0;
-  bool only_followers = true;
+  std::vector<std::string> missing, followers;
   for (size_t joint = 0; joint < names.size(); ++joint) {
-    followers += robot_joints_[joint].follows ? 1 : 0;
-    if (is_named[joint]) continue;
-    missing.push_back(names[joint]);
-    only_followers = only_followers && robot_joints_[joint].follows;
+    if (robot_joints_[joint].follows) followers.push_back(names[joint]);
+    if (!Contains(joints_, static_cast<int>(joint))) missing.push_back(names[joint]);
   }
   is_reduced_ = !missing.empty();
-  if (!is_reduced_) return;
-  if (!only_followers || missing.size() != followers) {
+  if (is_reduced_ && missing != followers)
     Fail(source, "joints", "must be all joints, or all that follow no other; missing: " + JoinNames(missing));
-  }
 }
 
 nlohmann::ordered_json ProgramLayout::ToJson() const {
@@ -159,12 +148,10 @@ nlohmann::ordered_json ProgramLayout::ToJson() const {
     }
   }
   if (base_ == 0) return json;
-  const auto position =
-      std::ranges::find_if(kPositions, [&](const auto& one) { return one.second == convention_.position; });
-  json["base"] = {{"position", position->first},
-                  {"velocity", convention_.angular_first ? "angular_linear" : "linear_angular"},
-                  {"linear_axes", convention_.linear_in_base ? "base" : "world"},
-                  {"angular_axes", convention_.angular_in_world ? "world" : "base"}};
+  const size_t choices[] = {static_cast<size_t>(convention_.position), convention_.angular_first ? 1U : 0U,
+                            convention_.linear_in_base ? 1U : 0U, convention_.angular_in_world ? 1U : 0U};
+  for (size_t k = 0; k < std::size(kBaseKeys); ++k)
+    json["base"][kBaseKeys[k].name] = kBaseKeys[k].words[choices[k]];
   return json;
 }
 

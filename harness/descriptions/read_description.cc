@@ -252,8 +252,8 @@ RobotDescription PlaceBodies(const std::vector<TabledBody>& bodies, const std::s
   robot.format = RobotFormat::kBodies;
   std::vector<std::string> strange, links;
   for (const TabledBody& row : bodies) {
-    const auto part = std::ranges::find(robot.parts, row.link, &DescribedPart::name);
-    if (part == robot.parts.end()) {
+    DescribedPart* const part = FindIn(robot.parts, row.link, &DescribedPart::name);
+    if (part == nullptr) {
       links.clear();
       for (const DescribedPart& one : robot.parts) links.push_back(one.name);
       strange.push_back(row.link + SuggestNearest(row.link, links));
@@ -276,7 +276,7 @@ RobotDescription PlaceBodies(const std::vector<TabledBody>& bodies, const std::s
 
 }  // namespace
 
-DescriptionFile::DescriptionFile(std::filesystem::path path, const UrdfOptions& options)
+DescriptionFile::DescriptionFile(const std::filesystem::path& path, const UrdfOptions& options)
     : DescriptionFile(path, ReadBytes(path), options) {}
 
 DescriptionFile::DescriptionFile(std::filesystem::path path, std::string text, const UrdfOptions& options)

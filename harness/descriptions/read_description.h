@@ -41,7 +41,7 @@ std::vector<TabledBody> ReadBodyTable(const std::string& text, const std::string
 class DescriptionFile {
  public:
   /// @throws InputError for a file that cannot be read; also for a URDF or a parameter file that is none.
-  explicit DescriptionFile(std::filesystem::path path, const UrdfOptions& options = {});
+  explicit DescriptionFile(const std::filesystem::path& path, const UrdfOptions& options = {});
   /// Reads a text that stands for the file's.
   DescriptionFile(std::filesystem::path path, std::string text, const UrdfOptions& options);
 

@@ -150,13 +150,8 @@ std::vector<std::string> DescribeBalls(const RobotDescription& robot) {
 }  // namespace
 
 std::vector<int> MatchJoints(const RobotSpec& a, const RobotSpec& b) {
-  std::map<std::string, int> index_of;
-  for (const Joint& joint : b.joints) index_of.emplace(joint.name, static_cast<int>(index_of.size()));
   std::vector<int> match;
-  for (const Joint& joint : a.joints) {
-    const auto found = index_of.find(joint.name);
-    match.push_back(found == index_of.end() ? -1 : found->second);
-  }
+  for (const Joint& joint : a.joints) match.push_back(IndexOf(b.joints, joint.name, &Joint::name));
   return match;
 }
 
@@ -168,7 +163,7 @@ RobotSpec AddSpheres(const RobotDescription& robot) {
 
 std::vector<std::string> DescribeCoordinates(const RobotDescription& robot) {
   std::vector<std::string> notes = DescribeBase(robot);
-  for (const std::string& note : DescribeBalls(robot)) notes.push_back(note);
+  Append(DescribeBalls(robot), &notes);
   return notes;
 }
 
@@ -223,7 +218,7 @@ std::vector<Pose> PlaceLinkFrames(const RobotDescription& a, const RobotDescript
 
 std::vector<LinkPlace> PlaceLinks(const RobotDescription& a, const RobotDescription& b) {
   const std::vector<int> b_of_a = MatchJoints(a.spec, b.spec);
-  if (std::ranges::find(b_of_a, -1) != b_of_a.end()) return {};
+  if (Contains(b_of_a, -1)) return {};
   const std::vector<Pose> placed = PlaceLinkFrames(a, b);
   std::vector<LinkPlace> places;
   if (a.spec.base.type == BaseType::kFloating) places.emplace_back();

@@ -9,6 +9,7 @@
 
 #include "controller/model/parameter_reader.h"
 #include "controller/model/robot_model.h"
+#include "harness/base/ranges.h"
 
 namespace dexcheck {
 

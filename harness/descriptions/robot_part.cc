@@ -10,13 +10,6 @@
 namespace dexcheck {
 namespace {
 
-/// The joint with that name, or that moves the link of that name as its own; -1.
-int FindJoint(const RobotSpec& spec, const std::string& name, std::string Joint::*part = &Joint::name) {
-  const auto found =
-      std::ranges::find_if(spec.joints, [&](const Joint& joint) { return joint.*part == name; });
-  return found == spec.joints.end() ? -1 : static_cast<int>(found - spec.joints.begin());
-}
-
 /// Returns for each joint whether it is `root` or hangs on it.
 std::vector<bool> ListSubtree(const RobotSpec& spec, int root) {
   std::vector<bool> is_in(spec.joints.size(), false);
@@ -66,7 +59,7 @@ void HoldJoint(int index, double value, RobotDescription* robot) {
 
 /// Leaves a link out with all that it carries; false when there is none.
 bool LeaveOut(const std::string& link, RobotDescription* robot) {
-  const int root = FindJoint(robot->spec, link, &Joint::link);
+  const int root = IndexOf(robot->spec.joints, link, &Joint::link);
   if (root < 0) {
     return std::erase_if(robot->parts, [&](const DescribedPart& part) { return part.name == link; }) > 0;
   }
@@ -98,8 +91,8 @@ void FixBase(const RobotDescription& other, RobotDescription* robot) {
 
 /// Those that only `only` keeps: all joints that are not below it.
 void HoldOthers(const std::string& only, const RobotDescription& robot, std::map<std::string, double>* held) {
-  int root = FindJoint(robot.spec, only, &Joint::link);
-  if (root < 0) root = FindJoint(robot.spec, only);
+  int root = IndexOf(robot.spec.joints, only, &Joint::link);
+  if (root < 0) root = IndexOf(robot.spec.joints, only, &Joint::name);
   if (root < 0) return;
   const std::vector<bool> is_kept = ListSubtree(robot.spec, root);
   for (size_t i = 0; i < is_kept.size(); ++i) {
@@ -118,8 +111,8 @@ void HoldFollowers(const RobotSpec& spec, std::map<std::string, double>* held) {
 }
 
 bool HasLink(const RobotDescription& robot, const std::string& name) {
-  return FindJoint(robot.spec, name, &Joint::link) >= 0 ||
-         std::ranges::any_of(robot.parts, [&](const DescribedPart& part) { return part.name == name; });
+  return IndexOf(robot.spec.joints, name, &Joint::link) >= 0 ||
+         Contains(robot.parts, name, &DescribedPart::name);
 }
 
 }  // namespace
@@ -142,8 +135,8 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
   std::vector<std::string> notes = TakeJointNames(*a, b);
   // Either file's name of a joint may be given.
   const auto translate = [&](const std::string& name) {
-    const auto found = std::ranges::find(of_b, name);
-    return found == of_b.end() ? name : b->spec.joints[static_cast<size_t>(found - of_b.begin())].name;
+    const int found = IndexOf(of_b, name);
+    return found < 0 ? name : b->spec.joints[static_cast<size_t>(found)].name;
   };
   const auto require = [&](bool is_there, const std::string& name, const char* option) {
     if (!is_there)
@@ -153,8 +146,9 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
   std::map<std::string, double> all_held;
   for (const auto& [name, value] : part.held) {
     const std::string joint = translate(name);
-    require(FindJoint(a->spec, joint) >= 0 || FindJoint(b->spec, joint) >= 0, name,
-            "--lock: must be a joint");
+    require(IndexOf(a->spec.joints, joint, &Joint::name) >= 0 ||
+                IndexOf(b->spec.joints, joint, &Joint::name) >= 0,
+            name, "--lock: must be a joint");
     all_held.emplace(joint, value);
   }
   for (const std::string& link : part.left_out)
@@ -163,7 +157,8 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
   if (!part.only.empty()) {
     const std::string only = translate(part.only);
     const auto has = [&](const RobotDescription& robot) {
-      return FindJoint(robot.spec, only, &Joint::link) >= 0 || FindJoint(robot.spec, only) >= 0;
+      return IndexOf(robot.spec.joints, only, &Joint::link) >= 0 ||
+             IndexOf(robot.spec.joints, only, &Joint::name) >= 0;
     };
     require(has(*a) || has(*b), part.only, "--only: must be a link or joint");
     for (const RobotDescription* robot : {a, b}) HoldOthers(only, *robot, &all_held);
@@ -181,7 +176,7 @@ std::vector<std::string> TakePart(const RobotPart& part, RobotDescription* a, Ro
     std::map<std::string, double> own = all_held;
     HoldFollowers(robot->spec, &own);
     for (const auto& [joint, value] : own) {
-      const int index = FindJoint(robot->spec, joint);
+      const int index = IndexOf(robot->spec.joints, joint, &Joint::name);
       if (index < 0) continue;
       HoldJoint(index, value, robot);
       ++*held;

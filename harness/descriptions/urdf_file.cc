@@ -29,13 +29,6 @@ constexpr size_t kMaxLinks = 2000;
 
 using Element = tinyxml2::XMLElement;
 
-/// The part of that name; nullptr when there is none.
-template <typename Part>
-const Part* Find(const std::vector<Part>& parts, std::string_view name) {
-  const auto found = std::ranges::find(parts, name, &Part::name);
-  return found == parts.end() ? nullptr : &*found;
-}
-
 /// The file of a mesh; empty when it is in none of the packages.
 std::filesystem::path FindMesh(const std::string& name, const std::filesystem::path& folder,
                                const std::vector<std::filesystem::path>& packages) {
@@ -99,7 +92,7 @@ void UrdfFile::AddLink(Element* element) {
   const std::string name = ReadAttribute(*element, "name");
   if (name.empty()) Fail(line, "link: must have a name");
   const std::string key = "link " + Quote(name) + ": ";
-  if (const UrdfLink* const other = Find(links_, name))
+  if (const UrdfLink* const other = FindIn(links_, name, &UrdfLink::name))
     Fail(line, key + "names must be unique, taken on line " + std::to_string(other->line));
   if (links_.size() == kMaxLinks)
     Fail(line, key + "a robot must have at most " + std::to_string(kMaxLinks) + " links, got more");
@@ -111,7 +104,7 @@ void UrdfFile::AddJoint(Element* element) {
                   ReadAttribute(*element, "type")};
   if (joint.name.empty()) joint.name = "#" + std::to_string(joints_.size());
   const std::string key = "joint " + Quote(joint.name) + ": ";
-  if (Find(joints_, joint.name) != nullptr) Fail(joint.line, key + "names must be unique");
+  if (Contains(joints_, joint.name, &UrdfJoint::name)) Fail(joint.line, key + "names must be unique");
   if (joints_.size() == kMaxLinks)
     Fail(joint.line, key + "a robot must have at most " + std::to_string(kMaxLinks) + " joints, got more");
   joints_.push_back(std::move(joint));
@@ -122,7 +115,7 @@ int UrdfFile::FindEnd(const UrdfJoint& joint, const char* end) const {
   const char* const name = child == nullptr ? nullptr : child->Attribute("link");
   const std::string key = "joint " + Quote(joint.name) + ": " + end + ": ";
   if (name == nullptr) Fail(joint.line, key + "missing, must name a link");
-  if (const UrdfLink* const found = Find(links_, name)) return static_cast<int>(found - links_.data());
+  if (const int found = IndexOf(links_, std::string_view(name), &UrdfLink::name); found >= 0) return found;
   std::vector<std::string> names;
   for (const UrdfLink& link : links_) names.push_back(link.name);
   const std::string nearest = FindNearest(name, names);
@@ -157,27 +150,21 @@ void UrdfFile::FindRoot() {
     }
     root_ = static_cast<int>(i);
   }
-  if (root_ < 0) FailCycle(0);
 }
 
-/// Every link must be reached from the root.
+/// Every link must hang on the root.
 void UrdfFile::RejectCycles() const {
-  std::vector<bool> reached(links_.size(), false);
-  std::vector<int> open = {root_};
-  while (!open.empty()) {
-    const int index = open.back();
-    open.pop_back();
-    reached[static_cast<size_t>(index)] = true;
-    for (const int child : link(index).child_joints) open.push_back(joint(child).child);
+  for (size_t i = 0; i < links_.size(); ++i) {
+    const UrdfLink* at = &links_[i];
+    for (size_t above = 0; at->parent_joint >= 0; at = &link(joint(at->parent_joint).parent))
+      if (++above > links_.size()) FailCycle(i);
   }
-  const auto lost = std::ranges::find(reached, false);
-  if (lost != reached.end()) FailCycle(static_cast<size_t>(lost - reached.begin()));
 }
 
 /// Follows the parents of a link that no root carries until one comes again.
 void UrdfFile::FailCycle(size_t link) const {
   std::vector<size_t> path;
-  while (std::ranges::find(path, link) == path.end()) {
+  while (!Contains(path, link)) {
     path.push_back(link);
     link = static_cast<size_t>(joint(links_[link].parent_joint).parent);
   }

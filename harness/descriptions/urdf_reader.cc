@@ -297,31 +297,24 @@ class UrdfReader {
 
   /// A joint that follows one which follows a third follows the third.
   void ReadCouplings() {
-    std::map<std::string, int> index_of;
-    for (const Joint& joint : robot_.spec.joints) {
-      index_of.emplace(joint.name, static_cast<int>(index_of.size()));
-    }
-    std::map<std::string, const Element*> mimic_of;
-    for (const UrdfJoint& joint : file_.joints())
-      mimic_of[joint.name] = joint.element->FirstChildElement("mimic");
     for (const UrdfJoint& joint : file_.joints()) {
-      const auto own = index_of.find(joint.name);
-      if (mimic_of[joint.name] == nullptr || own == index_of.end()) continue;
+      Joint* const own = FindIn(robot_.spec.joints, joint.name, &Joint::name);
+      const Element* mimic = joint.element->FirstChildElement("mimic");
+      if (mimic == nullptr || own == nullptr) continue;
       const std::string key = KeyOf(joint) + "mimic: ";
       JointCoupling coupling{-1, 1.0, 0.0};
       std::set<std::string> seen = {joint.name};
-      for (const Element* mimic = mimic_of[joint.name]; mimic != nullptr;) {
+      while (mimic != nullptr) {
         coupling.offset += coupling.multiplier * file_.ReadNumber(*mimic, key, "offset", 0.0);
         coupling.multiplier *= file_.ReadNumber(*mimic, key, "multiplier", 1.0);
         const std::string name = ReadAttribute(*mimic, "joint");
-        const auto leader = index_of.find(name);
-        if (leader == index_of.end())
+        coupling.leader = IndexOf(robot_.spec.joints, name, &Joint::name);
+        if (coupling.leader < 0)
           file_.Fail(joint.line, key + "must be a joint that moves, got " + Quote(name));
         if (!seen.insert(name).second) file_.Fail(joint.line, key + "must not be cyclic, got " + Quote(name));
-        coupling.leader = leader->second;
-        mimic = mimic_of[name];
+        mimic = FindIn(file_.joints(), name, &UrdfJoint::name)->element->FirstChildElement("mimic");
       }
-      robot_.spec.joints[static_cast<size_t>(own->second)].coupling = coupling;
+      own->coupling = coupling;
     }
   }
 
