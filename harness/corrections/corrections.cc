@@ -429,12 +429,11 @@ void TryReadings(const PrintedRobot& a, const PrintedRobot& b, bool of_second, i
 
 }  // namespace
 
-FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b,
-                                const CorrectionOptions& options) {
+FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b) {
   constexpr double kOneFault = 16.0;
   constexpr double kClearer = 20.0;
   constexpr double kSeveral = 40.0;
-  int budget = options.trials;
+  int budget = 60000;  // edits that are tried at most, some microseconds each
   FileCorrections best = OneWay(a, b, false, &budget).Run();
   if (best.agrees || best.bits <= kOneFault) return best;
   const auto take = [&](FileCorrections found) {
@@ -453,9 +452,8 @@ FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b,
   return best;
 }
 
-FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b,
-                                const CorrectionOptions& options) {
-  return FindCorrections(ReadPrintedRobot(a, &b), ReadPrintedRobot(b, &a), options);
+FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b) {
+  return FindCorrections(ReadPrintedRobot(a, &b), ReadPrintedRobot(b, &a));
 }
 
 std::string DescribeItem(const CorrectionItem& item, const std::string& file) {

@@ -44,16 +44,10 @@ struct FileCorrections {
   bool is_bounded = false;  ///< The bound on the work was reached: more may be explained than is.
 };
 
-struct CorrectionOptions {
-  int trials = 60000;  ///< Edits that are tried at most, some microseconds each.
-};
-
 /// Finds what makes the files differ by more than their digits allow. Corrections of the first file,
 /// unless the second is put right by fewer.
-FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b,
-                                const CorrectionOptions& options = {});
-FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b,
-                                const CorrectionOptions& options = {});
+FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b);
+FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b);
 
 /// One line: "joints q1, q2: rotation with its angles in degrees". @param file that has the fault; may be
 /// empty.

@@ -404,13 +404,9 @@ PrintedLink Carry(const PrintedLink& link, const LinkUndo& undo) {
   undo(&after);
   const std::vector<LinkNumber> carried = list(&after);
   std::vector<double> halves(carried.size(), 0.0);
-  for (const LinkNumber& number : list(&before)) {
-    if (*number.half <= 0.0) continue;
-    const double value = *number.value;
-    *number.value = value + *number.half;
+  MoveHalves(list(&before), [&] {
     PrintedLink moved = before;
     undo(&moved);
-    *number.value = value;
     const std::vector<LinkNumber> there = list(&moved);
     // Numbers of one rotation may be others altogether: its angle bounds them.
     const auto turn = [](const PrintedOrigin& a, const PrintedOrigin& b) {
@@ -424,7 +420,7 @@ PrintedLink Carry(const PrintedLink& link, const LinkUndo& undo) {
       const bool turns = k % 7 >= 3 && k < 14;
       halves[k] += turns ? std::min(apart, angles[k / 7]) : apart;
     }
-  }
+  });
   // A number that depends on none of before has the digits that the edit gave it.
   for (size_t k = 0; k < carried.size(); ++k) {
     if (halves[k] > 0.0) *carried[k].half = halves[k];

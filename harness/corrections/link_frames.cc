@@ -22,6 +22,8 @@ constexpr double kWrongOrigin = 40.0;
 constexpr double kWrongRotation = 25.0;
 constexpr double kWrongLength = 14.0;
 constexpr double kRegistered = 7.0;
+constexpr size_t kWidth = 8;           ///< States of the walk that are kept,
+constexpr size_t kChoices = 3;         ///< and that are returned.
 constexpr double kManyFrames = 0.5;    ///< Another frame, where most links have one.
 constexpr double kSearchAbove = 30.0;  ///< Registration by what the link carries is tried.
 constexpr double kRounding = 2e-6;     ///< m, or rad, added to the digits' tolerance.
@@ -48,7 +50,7 @@ Vector3d RemoveAlong(const Vector3d& v, const Vector3d& way) { return v - way * 
 
 class FrameChooser {
  public:
-  FrameChooser(const PrintedPair& pair, const FrameOptions& options) : pair_(pair), options_(options) {
+  explicit FrameChooser(const PrintedPair& pair) : pair_(pair) {
     axes_.resize(pair.a().links.size());
     for (const int link : pair.links()) {
       if (pair.Carrier(link) < 0) continue;
@@ -72,7 +74,7 @@ class FrameChooser {
     states = Walk();
     std::vector<ChosenFrames> frames;
     for (FrameState& state : states) {
-      if (frames.size() == options_.choices) break;
+      if (frames.size() == kChoices) break;
       frames.push_back(Finish(std::move(state)));
     }
     return frames;
@@ -140,7 +142,7 @@ class FrameChooser {
         }
       }
       std::ranges::stable_sort(next, {}, &FrameState::cost);
-      if (next.size() > options_.width) next.resize(options_.width);
+      if (next.size() > kWidth) next.resize(kWidth);
       states.swap(next);
     }
     return states;
@@ -176,16 +178,7 @@ class FrameChooser {
   }
 
   [[nodiscard]] static bool IsSame(const Pose& X, const Pose& Y, const PoseTolerance& open) {
-    return CalcAngle(X.linear().transpose() * Y.linear()) <= open.angle &&
-           ((X.translation() - Y.translation()).cwiseAbs().array() <= open.length.array()).all();
-  }
-
-  /// The first file's pose of a link with one origin of its chain another.
-  [[nodiscard]] Pose ReplaceOrigin(int link, int replaced, const Pose& X_origin) const {
-    Pose X = Pose::Identity();
-    for (const int k : pair_.node(link).chain)
-      X = X * (k == replaced ? X_origin : pair_.a().link(k).origin.CalcPose());
-    return X;
+    return !IsTurned(X, Y, open.angle) && !IsMoved(X, Y, open.length);
   }
 
   /// Poses that the first file's link has with a convention undone, or with another joint's origin, with
@@ -193,18 +186,18 @@ class FrameChooser {
   [[nodiscard]] std::vector<FrameChoice> ListUndone(int link) const {
     std::vector<FrameChoice> poses;
     PrintedLink right;
-    for (const int k : pair_.node(link).chain) {
+    const std::vector<ChainOrigin> origins = ListOrigins(pair_.a(), pair_.node(link));
+    for (const auto& [k, before, X, after] : origins) {
       const PrintedOrigin& origin = pair_.a().link(k).origin;
       for (const LinkEdit& edit : ListOriginEdits(origin)) {
         right.origin = origin;
         edit.undo(&right);
-        poses.push_back({kConventionBits + edit.bits, ReplaceOrigin(link, k, right.origin.CalcPose())});
+        poses.push_back({kConventionBits + edit.bits, before * right.origin.CalcPose() * after});
       }
     }
     for (const int other : pair_.links()) {
-      if (other == link || pair_.Carrier(other) < 0) continue;
-      const int last = pair_.node(link).chain.back();
-      poses.push_back({kOtherJoint, ReplaceOrigin(link, last, pair_.a().link(other).origin.CalcPose())});
+      if (other != link && pair_.Carrier(other) >= 0)
+        poses.push_back({kOtherJoint, origins.back().before * pair_.a().link(other).origin.CalcPose()});
     }
     return poses;
   }
@@ -217,33 +210,15 @@ class FrameChooser {
                             [&](const FrameChoice& choice) { return IsSame(choice.X, X_right, open); }))
       return kConventionBits - 1.0;
     double bits = kWrongOrigin;
-    const bool turned = CalcAngle(X.linear().transpose() * X_right.linear()) > open.angle;
-    const bool moved =
-        ((X.translation() - X_right.translation()).cwiseAbs().array() > open.length.array()).any();
+    const bool turned = IsTurned(X, X_right, open.angle), moved = IsMoved(X, X_right, open.length);
     if (!turned || !moved) bits = kNumberOfOrigin;
     if (!turned && X.translation().isZero()) bits = kMissingPosition;
-    for (const int k : pair_.node(link).chain) {
-      const PrintedOrigin& origin = pair_.a().link(k).origin;
-      const Pose before = FindBefore(link, k);
-      const Pose after = (before * origin.CalcPose()).inverse() * X;
+    for (const auto& [k, before, own, after] : ListOrigins(pair_.a(), pair_.node(link))) {
       const Pose right = before.inverse() * X_right * after.inverse();
-      if (((right.translation() - origin.CalcPose().translation()).cwiseAbs().array() >
-           open.length.array() + 1e-7)
-              .any())
-        continue;
-      bits =
-          std::min(bits, origin.CalcRotation().isIdentity(1e-12) ? kConventionBits : kNumberOfOrigin + 2.0);
+      if (IsMoved(right, own, open.length + Vector3d::Constant(1e-7))) continue;
+      bits = std::min(bits, own.linear().isIdentity(1e-12) ? kConventionBits : kNumberOfOrigin + 2.0);
     }
     return bits;
-  }
-
-  [[nodiscard]] Pose FindBefore(int link, int end) const {
-    Pose X = Pose::Identity();
-    for (const int k : pair_.node(link).chain) {
-      if (k == end) break;
-      X = X * pair_.a().link(k).origin.CalcPose();
-    }
-    return X;
   }
 
   [[nodiscard]] std::vector<FrameChoice> ListChoices(int link, const Pose& X_ab_P) const {
@@ -307,7 +282,7 @@ class FrameChooser {
         const Pose Z = X_right * X.inverse();
         const Pose& own = pair_.given(link).X;
         double bits = kRegistered + Weigh(link, X);
-        if (CalcAngle(own.linear().transpose() * Z.linear()) > kRounding + open.angle) bits += kWrongRotation;
+        if (IsTurned(own, Z, kRounding + open.angle)) bits += kWrongRotation;
         bits += kWrongLength * static_cast<double>(((own.translation() - Z.translation()).cwiseAbs().array() >
                                                     kRounding + open.length.array())
                                                        .count());
@@ -364,7 +339,6 @@ class FrameChooser {
   }
 
   const PrintedPair& pair_;
-  FrameOptions options_;
   std::vector<std::vector<CarriedAxis>> axes_;  // by link
   double other_frame_ = 0.0;
   int changed_ = -1;  // the link whose frame is to be another one
@@ -372,13 +346,10 @@ class FrameChooser {
 
 }  // namespace
 
-std::vector<ChosenFrames> ChooseFrames(const PrintedPair& pair, const FrameOptions& options) {
-  return FrameChooser(pair, options).Run();
-}
+std::vector<ChosenFrames> ChooseFrames(const PrintedPair& pair) { return FrameChooser(pair).Run(); }
 
-std::vector<ChosenFrames> ChangeFrame(const PrintedPair& pair, const ChosenFrames& chosen, int link,
-                                      const FrameOptions& options) {
-  return FrameChooser(pair, options).Change(chosen, link);
+std::vector<ChosenFrames> ChangeFrame(const PrintedPair& pair, const ChosenFrames& chosen, int link) {
+  return FrameChooser(pair).Change(chosen, link);
 }
 
 }  // namespace dexcheck

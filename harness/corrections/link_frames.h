@@ -8,11 +8,6 @@
 
 namespace dexcheck {
 
-struct FrameOptions {
-  size_t width = 8;    ///< States of the walk that are kept.
-  size_t choices = 3;  ///< That are returned.
-};
-
 /// Frames by link, and bits of those that are not the first file's.
 struct ChosenFrames {
   std::vector<Pose> X_ab;
@@ -25,11 +20,10 @@ struct ChosenFrames {
 /// what the link carries (its axis, its body, the axes on it) is where the first file has it. Bits of what is
 /// then wrong of the origin, of the body and of axes decide, and bits of another frame: few where most links
 /// have one.
-std::vector<ChosenFrames> ChooseFrames(const PrintedPair& pair, const FrameOptions& options = {});
+std::vector<ChosenFrames> ChooseFrames(const PrintedPair& pair);
 
 /// Choices in which one link has another frame than in `chosen`, each with the cheapest frames of the links
 /// that it carries. All other links keep theirs.
-std::vector<ChosenFrames> ChangeFrame(const PrintedPair& pair, const ChosenFrames& chosen, int link,
-                                      const FrameOptions& options = {});
+std::vector<ChosenFrames> ChangeFrame(const PrintedPair& pair, const ChosenFrames& chosen, int link);
 
 }  // namespace dexcheck

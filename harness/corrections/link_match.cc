@@ -188,13 +188,7 @@ class LinkMatcher {
 template <typename Part, typename Measure, typename Tolerance>
 void AddHalves(Part* part, const Measure& measure, Tolerance* tolerance) {
   const auto nominal = measure();
-  for (const LinkNumber& number : ListNumbers(part)) {
-    if (*number.half <= 0.0) continue;
-    const double value = *number.value;
-    *number.value = value + *number.half;
-    AddChange(nominal, measure(), tolerance);
-    *number.value = value;
-  }
+  MoveHalves(ListNumbers(part), [&] { AddChange(nominal, measure(), tolerance); });
 }
 
 }  // namespace
@@ -240,6 +234,26 @@ Pose CalcNodePose(const PrintedRobot& robot, const Node& node) {
   Pose X = Pose::Identity();
   for (const int link : node.chain) X = X * robot.link(link).origin.CalcPose();
   return X;
+}
+
+std::vector<ChainOrigin> ListOrigins(const PrintedRobot& robot, const Node& node) {
+  std::vector<ChainOrigin> origins;
+  const Pose whole = CalcNodePose(robot, node);
+  Pose before = Pose::Identity();
+  for (const int link : node.chain) {
+    const Pose X = robot.link(link).origin.CalcPose();
+    origins.push_back({link, before, X, (before * X).inverse() * whole});
+    before = before * X;
+  }
+  return origins;
+}
+
+bool IsTurned(const Pose& X, const Pose& Y, double open) {
+  return CalcAngle(X.linear().transpose() * Y.linear()) > open;
+}
+
+bool IsMoved(const Pose& X, const Pose& Y, const Vector3d& open) {
+  return ((X.translation() - Y.translation()).cwiseAbs().array() > open.array()).any();
 }
 
 Pose CalcPartPose(const PrintedRobot& robot, const Node& node, int part) {

@@ -49,6 +49,15 @@ struct PoseTolerance {
 };
 
 Pose CalcNodePose(const PrintedRobot& robot, const Node& node);
+/// An origin of a node's chain: the node stands at before * X * after.
+struct ChainOrigin {
+  int link;
+  Pose before, X, after;
+};
+std::vector<ChainOrigin> ListOrigins(const PrintedRobot& robot, const Node& node);
+/// Whether two poses differ by more than this angle, or along an axis by more than this length.
+bool IsTurned(const Pose& X, const Pose& Y, double open);
+bool IsMoved(const Pose& X, const Pose& Y, const Vector3d& open);
 /// Pose of the frame of one of its parts in a node's frame.
 Pose CalcPartPose(const PrintedRobot& robot, const Node& node, int part);
 MassProperties CalcNodeBody(const PrintedRobot& robot, const Node& node);

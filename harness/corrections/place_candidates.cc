@@ -53,8 +53,7 @@ void CandidateSearch::SearchPlace(int link) {
   const bool one = node.chain.size() == 1;
   const RightNode& right = pair_.right(link);
   const PoseTolerance& open = pair_.given(link).pose;
-  Pose before = Pose::Identity();
-  for (const int k : node.chain) {
+  for (const auto& [k, before, X, after] : ListOrigins(pair_.a(), node)) {
     Origin origin;
     origin.link = k;
     origin.node = link;
@@ -63,18 +62,13 @@ void CandidateSearch::SearchPlace(int link) {
     origin.extra = one ? 0.0 : std::log2(static_cast<double>(node.chain.size())) + 1.0;
     origin.given = pair_.a().link(k).origin;
     constexpr double kUnprinted = 4.0;
-    if (!origin.is_last && origin.given.CalcPose().isApprox(Pose::Identity(), 1e-12))
-      origin.extra += kUnprinted;
-    const Pose X = origin.given.CalcPose();
-    const Pose after = (before * X).inverse() * pair_.given(link).X;
+    if (!origin.is_last && X.isApprox(Pose::Identity(), 1e-12)) origin.extra += kUnprinted;
     origin.right = before.inverse() * right.X * after.inverse();
     origin.open_angle = open.angle + right.pose.angle;
     origin.open_length = open.length + right.pose.length;
     if (!one) origin.open_length = Vector3d::Constant(origin.open_length.norm());
-    origin.turned = CalcAngle(X.linear().transpose() * origin.right.linear()) > origin.open_angle;
-    origin.moved =
-        ((X.translation() - origin.right.translation()).cwiseAbs().array() > origin.open_length.array())
-            .any();
+    origin.turned = IsTurned(X, origin.right, origin.open_angle);
+    origin.moved = IsMoved(X, origin.right, origin.open_length);
     EditFrames frames{{X}};
     if (origin.turned) frames.X_PL.push_back(origin.right);
     const bool turns = origin.turned && (one || !origin.moved);
@@ -95,7 +89,6 @@ void CandidateSearch::SearchPlace(int link) {
       if (origin.turned && origin.moved) SearchPoseNumbers(origin);
     }
     if (turns) SearchRotationNumbers(origin);
-    before = before * X;
   }
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <limits>
 
 namespace dexcheck {
 namespace {
@@ -21,18 +22,13 @@ double FindMedian(std::vector<double> halves) {
 
 bool IsWhole(double value) { return std::abs(value - std::round(value)) < 1e-12; }
 
-template <typename Vector>
-void Collect(const Vector& values, const Vector& halves, std::vector<double>* all) {
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (!IsWhole(values[i])) all->push_back(halves[i]);
-  }
-}
-
-template <typename Vector>
-void Raise(const Vector& values, double least, Vector* halves) {
-  for (Eigen::Index i = 0; i < values.size(); ++i) {
-    if (!IsWhole(values[i])) (*halves)[i] = std::max((*halves)[i], least);
-  }
+/// Gives numbers at least the median half unit of those that are no whole ones.
+void Level(const std::vector<LinkNumber>& broken, const std::vector<LinkNumber>& all,
+           double most = std::numeric_limits<double>::infinity()) {
+  std::vector<double> halves;
+  for (const LinkNumber& number : broken) halves.push_back(*number.half);
+  const double least = std::min(FindMedian(std::move(halves)), most);
+  for (const LinkNumber& number : all) *number.half = std::max(*number.half, least);
 }
 
 }  // namespace
@@ -234,24 +230,21 @@ void LevelPrecision(PrintedRobot* robot) {
   // At most a micrometre, and a hundredth of a milliradian: a file of few digits stays as it is.
   constexpr double kMostTurn = 1e-5;
   constexpr double kMostLength = 1e-6;
-  std::vector<double> turns, lengths, ranges;
-  for (const PrintedLink& link : robot->links) {
-    Collect(link.origin.r, link.origin.half_r, &turns);
-    Collect(link.origin.t, link.origin.half_t, &lengths);
+  std::vector<LinkNumber> turns, lengths, ends, limits;
+  for (PrintedLink& link : robot->links) {
+    const std::vector<LinkNumber> numbers = ListNumbers(&link.origin);
+    for (size_t k = 0; k < numbers.size(); ++k) {
+      if (!IsWhole(*numbers[k].value)) (k < 3 ? lengths : turns).push_back(numbers[k]);
+    }
     if (!link.joint.range) continue;
-    for (const PrintedScalar& limit : *link.joint.range) {
-      if (limit.value != 0.0) ranges.push_back(limit.half);
+    for (PrintedScalar& limit : *link.joint.range) {
+      limits.push_back({&limit.value, &limit.half});
+      if (limit.value != 0.0) ends.push_back(limits.back());
     }
   }
-  const double turn = std::min(FindMedian(std::move(turns)), kMostTurn);
-  const double length = std::min(FindMedian(std::move(lengths)), kMostLength);
-  const double range = FindMedian(std::move(ranges));
-  for (PrintedLink& link : robot->links) {
-    Raise(link.origin.r, turn, &link.origin.half_r);
-    Raise(link.origin.t, length, &link.origin.half_t);
-    if (!link.joint.range) continue;
-    for (PrintedScalar& limit : *link.joint.range) limit.half = std::max(limit.half, range);
-  }
+  Level(turns, turns, kMostTurn);
+  Level(lengths, lengths, kMostLength);
+  Level(ends, limits);
   LevelWhole(robot);
 }
 

@@ -12,7 +12,6 @@
 
 #include "controller/common/types.h"
 #include "controller/model/rigid_body.h"
-#include "harness/base/ranges.h"
 #include "harness/descriptions/robot_description.h"
 
 namespace dexcheck {
@@ -161,6 +160,18 @@ struct LinkNumber {
 /// Place and rotation; mass, centre, rotation and entries.
 std::vector<LinkNumber> ListNumbers(PrintedOrigin* origin);
 std::vector<LinkNumber> ListNumbers(PrintedInertial* inertial);
+
+/// Calls visit() with each of the numbers moved by its half unit.
+template <typename Visit>
+void MoveHalves(const std::vector<LinkNumber>& numbers, const Visit& visit) {
+  for (const LinkNumber& number : numbers) {
+    if (*number.half <= 0.0) continue;
+    const double value = *number.value;
+    *number.value = value + *number.half;
+    visit();
+    *number.value = value;
+  }
+}
 
 /// Both solutions for roll, pitch, yaw of a rotation; at a quarter turn of pitch, yaw or roll is 0.
 std::array<Vector3d, 2> SolveRollPitchYaw(const Matrix3d& R);

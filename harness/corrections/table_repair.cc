@@ -51,8 +51,19 @@ class TableRepair final : private RepairWriter {
     bool states_convention;  ///< Of its chain's rows.
   };
 
-  /// The row, or the entry below `key`, of a joint or link of that name.
-  [[nodiscard]] Entry Find(const std::string& key, const std::string& name) const {
+  /// The entry of a list that has this name; none where there is none.
+  [[nodiscard]] static std::optional<Entry> FindIn(const toml::array* list, const std::string& begin,
+                                                   const char* key, const std::string& name, bool states) {
+    for (size_t k = 0; list != nullptr && k < list->size(); ++k) {
+      const toml::table* const entry = list->get(k)->as_table();
+      if ((*entry)[key].value_or(std::string()) == name)
+        return Entry{entry, begin + std::to_string(k), states};
+    }
+    return std::nullopt;
+  }
+
+  /// The row, the frame, or the entry below `key`, of a joint or link of that name.
+  [[nodiscard]] std::optional<Entry> Look(const std::string& key, const std::string& name) const {
     const toml::array* const chains = root_["chain"].as_array();
     for (size_t i = 0; chains != nullptr && i < chains->size(); ++i) {
       const toml::table& chain = *chains->get(i)->as_table();
@@ -61,15 +72,15 @@ class TableRepair final : private RepairWriter {
       const std::string own = name.substr(prefix.size());
       const std::string begin = fmt::format("chain.{}.{}.", i, key);
       const bool states = chain.contains("convention");
-      if (const toml::array* const rows = chain[key].as_array()) {
-        for (size_t k = 0; k < rows->size(); ++k) {
-          const toml::table* const row = rows->get(k)->as_table();
-          if ((*row)["joint"].value_or(std::string()) == own) return {row, begin + std::to_string(k), states};
-        }
-      } else if (const toml::table* const entry = chain[key][own].as_table()) {
-        return {entry, begin + own, states};
-      }
+      if (const toml::table* const entry = chain[key][own].as_table())
+        return Entry{entry, begin + own, states};
+      const auto found = FindIn(chain[key].as_array(), begin, key == "rows" ? "joint" : "name", own, states);
+      if (found) return found;
     }
+    return std::nullopt;
+  }
+  [[nodiscard]] Entry Find(const std::string& key, const std::string& name) const {
+    if (const std::optional<Entry> entry = Look(key, name)) return *entry;
     Refuse(fmt::format("{} is not among the {} of its chain", name, key));
   }
 
@@ -110,24 +121,10 @@ class TableRepair final : private RepairWriter {
 
   /// Writes an entry of the file's "frame", or of a chain's "frames".
   void WriteFrame(const PrintedLink& frame, const PrintedOrigin& origin) {
-    const auto set = [&](const toml::array* entries, const std::string& begin, const std::string& prefix) {
-      for (size_t k = 0; entries != nullptr && k < entries->size(); ++k) {
-        const toml::table& entry = *entries->get(k)->as_table();
-        if (prefix + entry["name"].value_or(std::string()) != frame.name) continue;
-        SetPose({&entry, begin + std::to_string(k), false}, frame.origin, origin);
-        return true;
-      }
-      return false;
-    };
-    if (set(root_["frame"].as_array(), "frame.", "")) return;
-    const toml::array* const chains = root_["chain"].as_array();
-    for (size_t i = 0; chains != nullptr && i < chains->size(); ++i) {
-      const toml::table& chain = *chains->get(i)->as_table();
-      if (set(chain["frames"].as_array(), fmt::format("chain.{}.frames.", i),
-              chain["prefix"].value_or(std::string())))
-        return;
-    }
-    Refuse("frame " + frame.name + " must be written by hand");
+    std::optional<Entry> entry = FindIn(root_["frame"].as_array(), "frame.", "name", frame.name, false);
+    if (!entry) entry = Look("frames", frame.name);
+    if (!entry) Refuse("frame " + frame.name + " must be written by hand");
+    SetPose(*entry, frame.origin, origin);
   }
 
   void SetPose(const Entry& entry, const PrintedOrigin& before, const PrintedOrigin& origin) {
