@@ -48,4 +48,12 @@ Json ParseJson(std::string_view text) {
   return Json::parse(text, nullptr, /*allow_exceptions=*/false);
 }
 
+/// The text at a place, "/attribution/cause"; empty where there is none.
+template <typename Json>
+std::string FindText(const Json& json, const char* place) {
+  const typename Json::json_pointer pointer(place);
+  return json.contains(pointer) && json.at(pointer).is_string() ? json.at(pointer).template get<std::string>()
+                                                                : "";
+}
+
 }  // namespace dexcheck

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "harness/cli/commands.h"
-#include "harness/run/run_mutation_options.h"
+#include "harness/run/run_mutation.h"
 
 namespace dexcheck::cli {
 

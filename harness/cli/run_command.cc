@@ -25,7 +25,6 @@
 #include "harness/report/run_data.h"
 #include "harness/run/declared_share.h"
 #include "harness/run/joint_margins.h"
-#include "harness/run/run_answer.h"
 
 namespace dexcheck::cli {
 namespace {

@@ -116,12 +116,11 @@ void PrintTask(const ClosedLoop& loop) {
 
 void PrintTracking(const Scenario& scenario, const TrackingStatistics& tracking) {
   if (scenario.joint_task() != nullptr) {
-    fmt::print("joints: largest error {:.2e} rad (rms {:.2e})\n", tracking.joints_max(),
-               tracking.joints_rms());
+    fmt::print("joints: largest error {:.2e} rad (rms {:.2e})\n", tracking.joints.max, tracking.joints.rms());
     return;
   }
   fmt::print("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad\n",
-             tracking.position_max(), tracking.position_rms(), tracking.orientation_max());
+             tracking.position.max, tracking.position.rms(), tracking.orientation.max);
 }
 
 /// At which motors torques were cut off, and how long; the longest first.

@@ -63,8 +63,7 @@ std::string RunData::NameColumn(const SignalInfo& signal, int column) {
 }
 
 std::string RunData::FindSummaryText(const char* pointer) const {
-  const nlohmann::json::json_pointer place(pointer);
-  return summary_.contains(place) && summary_[place].is_string() ? summary_[place].get<std::string>() : "";
+  return dexcheck::FindText(summary_, pointer);
 }
 
 double RunData::FindSummaryNumber(const char* pointer) const {

@@ -18,7 +18,6 @@
 #include "harness/plant/sensing.h"
 #include "harness/run/loop_parts.h"
 #include "harness/run/step_checker.h"
-#include "harness/run/thread_choice.h"
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {

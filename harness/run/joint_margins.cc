@@ -220,8 +220,8 @@ void JudgeGains(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   result->margins = CalcJointMargins(setup, setup.joints()->gains);
   if (!result->margins) return;
   std::string& card = result->gain_card;
-  card = fmt::format("# your gains: largest error of a joint {:.3g}, rms {:.3g}",
-                     result->tracking.joints_max(), result->tracking.joints_rms());
+  card = fmt::format("# your gains: largest error of a joint {:.3g}, rms {:.3g}", result->tracking.joints.max,
+                     result->tracking.joints.rms());
   if (result->peak_effort > 0.0)
     card += fmt::format("\n# largest torque {:.3g} of its limit ({})", result->peak_effort,
                         result->busiest_motor);

@@ -8,10 +8,7 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/base/files.h"
-#include "harness/base/watched_process.h"
-#include "harness/run/controller_peers.h"
-#include "harness/run/library_controller.h"
-#include "harness/run/protocol_controller.h"
+#include "harness/run/controller_hosts.h"
 
 namespace dexcheck {
 namespace {
@@ -28,9 +25,6 @@ std::string MakeScenarioText(const Scenario& scenario) {
   return ApplyOverrides(scenario.text, scenario.source, overrides);
 }
 
-/// Name of the controller in messages.
-std::string NameOf(const Scenario& scenario) { return "controller " + scenario.controller.run; }
-
 /// Returns the program that runs a Python file: the main program of the Python module.
 std::filesystem::path FindPythonMain(const std::string& name) {
   std::error_code error;
@@ -45,15 +39,12 @@ std::filesystem::path FindPythonMain(const std::string& name) {
 
 std::unique_ptr<ControllerPeer> StartProgram(const OwnControllerSetup& setup) {
   const std::filesystem::path file = FindControllerFile(setup.own);
-  if (file.empty())
-    return std::make_unique<ProgramPeer>(setup,
-                                         std::vector<std::string>{"/bin/sh", "-c", "exec " + setup.own.run});
+  if (file.empty()) return MakeProgramPeer(setup, {"/bin/sh", "-c", "exec " + setup.own.run});
   if (::access(file.c_str(), R_OK) != 0)
     throw InputError(setup.name + ": " + file.string() + ": cannot be read");
   const char* const python = std::getenv("DEXCHECK_PYTHON");
-  return std::make_unique<ProgramPeer>(
-      setup, std::vector<std::string>{python == nullptr ? "python3" : python,
-                                      FindPythonMain(setup.name).string(), file.string()});
+  return MakeProgramPeer(
+      setup, {python == nullptr ? "python3" : python, FindPythonMain(setup.name).string(), file.string()});
 }
 
 }  // namespace
@@ -71,7 +62,7 @@ std::unique_ptr<Controller> MakeOwnController(const Setup& setup, const Sampling
     throw InputError(scenario.source + ": task: is done by no other controller");
   if (scenario.control.kappa == ContactSource::kIntegrated)
     throw InputError(scenario.source + ": control.kappa: other controllers get measured contacts");
-  const OwnControllerSetup own{NameOf(scenario),
+  const OwnControllerSetup own{"controller " + scenario.controller.run,
                                &setup.model(),
                                setup.fingertips(),
                                setup.object().body,
@@ -82,13 +73,8 @@ std::unique_ptr<Controller> MakeOwnController(const Setup& setup, const Sampling
                                MakeRobotText(setup),
                                MakeScenarioText(scenario),
                                scenario.controller};
-  if (FindControllerFile(own.own).extension() != ".so")
-    return std::make_unique<ProtocolController>(StartProgram(own), own);
-  ContinueWatched(NameOf(scenario));
-  auto library = std::make_unique<ForeignLibrary>(own);
-  if (library->Find<void>("dexcheck_protocol") == nullptr)
-    return std::make_unique<LibraryController>(std::move(library), own);
-  return std::make_unique<ProtocolController>(std::make_unique<LibraryPeer>(std::move(library), own), own);
+  if (FindControllerFile(own.own).extension() == ".so") return MakeLibraryController(own);
+  return MakeProtocolController(StartProgram(own), own);
 }
 
 std::string HashController(const OwnControllerOptions& own) {

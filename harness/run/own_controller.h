@@ -5,9 +5,8 @@
 #include <filesystem>
 #include <memory>
 #include <string>
-#include <vector>
 
-#include "controller/control/controller_library.h"
+#include "controller/control/controller.h"
 #include "harness/plant/plant.h"
 #include "harness/scenario/setup.h"
 
@@ -17,21 +16,6 @@ namespace dexcheck {
 class ControllerFailure : public RunFailure {
  public:
   using RunFailure::RunFailure;
-};
-
-/// Inputs of a controller of the user's own.
-struct OwnControllerSetup {
-  std::string name;  ///< For messages: "controller law.so".
-  const RobotModel* model = nullptr;
-  std::vector<int> fingertips;
-  MassProperties object;
-  const Surface* surface = nullptr;
-  GraspControllerOptions options;
-  Sampling sampling;
-  const JointPlan* joints = nullptr;  ///< Plan of a scenario that moves joints; else null.
-  std::string robot_text;             ///< The parameter file, with the changes made to it.
-  std::string scenario_text;          ///< The scenario, with the changes made to it.
-  OwnControllerOptions own;
 };
 
 /// Makes the scenario's own controller, which must be stated.
@@ -44,12 +28,5 @@ std::filesystem::path FindControllerFile(const OwnControllerOptions& own);
 
 /// Returns the hash of that file's bytes; empty for a command.
 std::string HashController(const OwnControllerOptions& own);
-
-/// Throws the error of a controller that does not take a parameter. @param why such as "takes no parameters".
-[[noreturn]] void RejectParameter(const OwnControllerSetup& setup, const std::string& parameter,
-                                  const std::string& why);
-
-/// @throws ControllerFailure, in the name of `who`, unless there are n torques.
-void RequireTorques(const std::string& who, const Command& command, Eigen::Index n);
 
 }  // namespace dexcheck

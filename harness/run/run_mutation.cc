@@ -253,7 +253,7 @@ bool RunCampaign::RunLoop(const Setup& setup, LoopParts parts, RunMutant* mutant
   mutant->failure = result.failure;
   AddFailed(runner.loop().checks().model_checks(), &mutant->failed_checks);
   AddFailed(runner.loop().checks().motion_checks(), &mutant->failed_checks);
-  mutant->position_error = result.tracking.position_max();
+  mutant->position_error = result.tracking.position.max;
   return true;
 }
 

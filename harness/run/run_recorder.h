@@ -34,18 +34,18 @@ class RunRecorder {
 
  private:
   using Source = std::function<void(const StepRecord& step, std::span<double> row)>;
-  /// Adds one quantity. @param width its numbers. @param columns their names, if they have any. @param
-  /// numbers attributes.
-  void Add(const std::string& name, const std::string& unit, const std::string& description, int width,
+  /// Adds one quantity. @param columns names of its numbers; none of a single number. @param numbers
+  /// attributes.
+  void Add(const std::string& name, const std::string& unit, const std::string& description,
            std::vector<std::string> columns, Source source, std::map<std::string, double> numbers = {});
-  /// Adds a quantity that is a single number.
-  void AddNumber(const std::string& name, const std::string& unit, const std::string& description,
-                 Source source);
   void AddStateSignals();
   void AddJointSignals();
   void AddFootSignals();
   void AddObjectSignals();
   void AddContactSignals();
+  /// Adds slip and use of the friction cone of each part. @param what it is: "fingertip".
+  void AddSlips(const std::string& group, const std::string& what, const std::vector<std::string>& parts,
+                std::vector<SlipState> StepFindings::*states);
   void AddFollowedContacts();
   void AddTaskSignals();
   void AddCheckSignals();

@@ -4,9 +4,12 @@
 #include <cmath>
 
 #include "controller/common/text.h"
+#include "harness/base/bounded_json.h"
 #include "harness/base/check_record.h"
 #include "harness/base/interrupts.h"
 #include "harness/base/version.h"
+#include "harness/checks/check_table.h"
+#include "harness/checks/failure_cause.h"
 #include "harness/engine/machine.h"
 
 namespace dexcheck {
@@ -14,16 +17,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-double Rms(double squares, long count) {
-  return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
-}
-
 /// Converts the object's tracking statistics.
 Json TrackingToJson(const TrackingStatistics& tracking) {
-  return {{"position_error_max_m", tracking.position_max()},
-          {"position_error_rms_m", tracking.position_rms()},
-          {"orientation_error_max_rad", tracking.orientation_max()},
-          {"orientation_error_rms_rad", tracking.orientation_rms()}};
+  return {{"position_error_max_m", tracking.position.max},
+          {"position_error_rms_m", tracking.position.rms()},
+          {"orientation_error_max_rad", tracking.orientation.max},
+          {"orientation_error_rms_rad", tracking.orientation.rms()}};
 }
 
 Json TaskToJson(const ClosedLoop& loop) {
@@ -93,19 +92,21 @@ const char* NameOf(Verdict verdict) {
   return verdict == Verdict::kDisagreement ? "disagreement" : "failed";
 }
 
-void TrackingStatistics::Add(const TrackingError& error) {
-  position_max_ = Worst(position_max_, error.position.norm());
-  position_squares_ += error.position.squaredNorm();
-  orientation_max_ = Worst(orientation_max_, error.orientation);
-  orientation_squares_ += error.orientation * error.orientation;
-  joints_max_ = Worst(joints_max_, error.joints);
-  joints_squares_ += error.joints * error.joints;
-  ++count_;
+void ErrorStatistics::Add(double size, double square) {
+  max = Worst(max, size);
+  squares += square;
+  ++count;
 }
 
-double TrackingStatistics::position_rms() const { return Rms(position_squares_, count_); }
-double TrackingStatistics::orientation_rms() const { return Rms(orientation_squares_, count_); }
-double TrackingStatistics::joints_rms() const { return Rms(joints_squares_, count_); }
+double ErrorStatistics::rms() const {
+  return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
+}
+
+void TrackingStatistics::Add(const TrackingError& error) {
+  position.Add(error.position.norm(), error.position.squaredNorm());
+  orientation.Add(error.orientation, error.orientation * error.orientation);
+  joints.Add(error.joints, error.joints * error.joints);
+}
 
 void AddLimits(const StepRecord& step, double dt, std::vector<LimitedTorque>* limited) {
   const VectorXd& cut = step.drive.cut;
@@ -147,8 +148,8 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
                {"overrides", scenario.overrides},   {"duration_s", scenario.duration},
                {"simulated_s", loop.time()},        {"time_step_s", scenario.plant.time_step}};
   if (scenario.joint_task() != nullptr) {
-    json["tracking"] = {{"joint_error_max_rad", result.tracking.joints_max()},
-                        {"joint_error_rms_rad", result.tracking.joints_rms()}};
+    json["tracking"] = {{"joint_error_max_rad", result.tracking.joints.max},
+                        {"joint_error_rms_rad", result.tracking.joints.rms()}};
   } else {
     json["tracking"] = TrackingToJson(result.tracking);
   }
@@ -211,6 +212,62 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
   json["versions"] = {{"dexcheck", Version()}, {"mujoco", mj_versionString()}};
   json["machine"] = DescribeMachine();
   return json;
+}
+
+namespace {
+
+/// Lists the causes, each with the channel that shows it.
+void AddCauses(const Json& causes, Answer* answer) {
+  bool has_several = false;
+  for (const Json& cause : causes) {
+    const std::string channel = FindText(cause, "/channel");
+    const std::string prefix = channel.empty() || channel == "observation" ? "" : channel + ": ";
+    answer->causes.push_back(prefix + FindText(cause, "/text"));
+    has_several = has_several || (FindText(cause, "/outcome") == "class" && cause["faults"].size() > 1);
+  }
+  if (has_several) answer->remarks.emplace_back("another motion may separate the causes joined by \"or\"");
+}
+
+/// Returns whether a motor is one that a run cannot drive.
+bool HasServos(const Json& checks) {
+  for (const auto& [name, check] : checks.items())
+    if (name.starts_with("motor_") && check.is_object() && !check.value("pass", true)) return true;
+  return false;
+}
+
+}  // namespace
+
+Answer MakeRunAnswer(const Json& summary, std::span<const CheckRecord> checks) {
+  const std::string verdict = FindText(summary, "/verdict");
+  const std::string cause = FindText(summary, "/attribution/cause");
+  Answer answer;
+  if (verdict == "failed") {
+    answer = {Answer::Tone::kBad, "FAILED", FindText(summary, "/failure") + "."};
+  } else if (verdict == "disagreement") {
+    answer = {Answer::Tone::kBad, "DISAGREEMENT", std::string(DescribeCause(cause)) + "."};
+  } else if (checks.empty()) {
+    answer = {Answer::Tone::kOpen, "NOT CHECKED", "the run completed."};
+  } else {
+    const bool is_ideal = !summary.contains("plant_declared");
+    answer.word = "PASS";
+    answer.sentence =
+        DescribeWhatHolds(checks) + (is_ideal ? "." : ", the scenario's imperfections counted in.");
+  }
+  if (cause.empty() || cause == "none") return answer;
+  if (summary.contains("causes")) AddCauses(summary["causes"], &answer);
+  std::string evidence = FindText(summary, "/attribution/evidence");
+  // Causes are listed already.
+  for (const Json& one : summary.value("causes", Json::array())) {
+    const std::string text = "; " + FindText(one, "/text");
+    if (const size_t at = evidence.find(text); at != std::string::npos) evidence.erase(at, text.size());
+  }
+  if (answer.causes.empty() || answer.causes.front() != evidence)
+    answer.remarks.push_back("evidence: " + evidence);
+  if (summary.contains("checks") && HasServos(summary["checks"]))
+    answer.remarks.emplace_back(
+        "a run sends torques, so that each actuator must be a <motor> of gear 1: dexcheck import FILE.xml "
+        "--motors --out COPY.xml writes such a copy");
+  return answer;
 }
 
 }  // namespace dexcheck

@@ -4,10 +4,12 @@
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "harness/base/answer.h"
 #include "harness/diagnosis/attribution.h"
 #include "harness/diagnosis/causes.h"
 #include "harness/diagnosis/run_causes.h"
@@ -21,26 +23,23 @@ enum class Verdict { kPass, kDisagreement, kFailed };
 /// "pass", "disagreement", "failed".
 const char* NameOf(Verdict verdict);
 
-/// Statistics of the object's tracking error.
-class TrackingStatistics {
- public:
-  void Add(const TrackingError& error);
-  [[nodiscard]] double position_max() const { return position_max_; }
-  [[nodiscard]] double position_rms() const;
-  [[nodiscard]] double orientation_max() const { return orientation_max_; }
-  [[nodiscard]] double orientation_rms() const;
-  /// Largest error of a joint, rad or m.
-  [[nodiscard]] double joints_max() const { return joints_max_; }
-  [[nodiscard]] double joints_rms() const;
+/// Statistics of an error over the steps of a run.
+struct ErrorStatistics {
+  double max = 0.0;
+  double squares = 0.0;  ///< Their sum.
+  long count = 0;
 
- private:
-  double position_max_ = 0.0;
-  double position_squares_ = 0.0;
-  double orientation_max_ = 0.0;
-  double orientation_squares_ = 0.0;
-  double joints_max_ = 0.0;
-  double joints_squares_ = 0.0;
-  long count_ = 0;
+  void Add(double size, double square);
+  [[nodiscard]] double rms() const;
+};
+
+/// Statistics of the tracking errors.
+struct TrackingStatistics {
+  ErrorStatistics position;     ///< Of the object, m.
+  ErrorStatistics orientation;  ///< rad.
+  ErrorStatistics joints;       ///< Of the joint that is farthest off, rad or m.
+
+  void Add(const TrackingError& error);
 };
 
 /// Torque that a motor's limit cut off.
@@ -77,5 +76,10 @@ void Judge(const Setup& setup, const ClosedLoop& loop, const SearchOptions& sear
 
 /// Returns the summary with the keys that README.md lists for summary.json; lengths m, angles rad.
 nlohmann::ordered_json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& result);
+
+/// Returns a run's verdict with its causes, numbered in the order of the summary, and the evidence.
+/// @param summary as summary.json has it, of this or an older version. @param checks all that were made; none
+/// of a run that was not checked.
+Answer MakeRunAnswer(const nlohmann::ordered_json& summary, std::span<const CheckRecord> checks);
 
 }  // namespace dexcheck

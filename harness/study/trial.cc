@@ -246,13 +246,13 @@ std::array<double, kNumMetrics> TrialMonitor::CalcMetrics(const TrackingStatisti
   metrics[kSimulatedTime] = static_cast<double>(steps_) * time_step_;
   if (steps_ == 0) return metrics;
   if (of_joints_) {
-    metrics[kJointErrorRms] = tracking.joints_rms();
-    metrics[kJointErrorMax] = tracking.joints_max();
+    metrics[kJointErrorRms] = tracking.joints.rms();
+    metrics[kJointErrorMax] = tracking.joints.max;
   } else {
-    metrics[kPositionErrorRms] = tracking.position_rms();
-    metrics[kPositionErrorMax] = tracking.position_max();
-    metrics[kOrientationErrorRms] = tracking.orientation_rms();
-    metrics[kOrientationErrorMax] = tracking.orientation_max();
+    metrics[kPositionErrorRms] = tracking.position.rms();
+    metrics[kPositionErrorMax] = tracking.position.max;
+    metrics[kOrientationErrorRms] = tracking.orientation.rms();
+    metrics[kOrientationErrorMax] = tracking.orientation.max;
   }
   if (start_error_ > 0.0 && settled_) metrics[kSettlingTime] = settled_since_;
   if (start_error_ > 0.0 && by_position_) metrics[kOvershoot] = overshoot_;

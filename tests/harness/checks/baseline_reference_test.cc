@@ -73,7 +73,7 @@ TEST(BaselineRun, FeedForwardFollowsTheCurveAndPdAloneLags) {
     ShippedRun run("curve", {"control.law=" + law, "expect={ from = 0 }", "duration=2.5", "settle=0.5"});
     const RunResult& result = run.Run();
     EXPECT_TRUE(result.failure.empty()) << law << result.failure;
-    return result.tracking.position_max();
+    return result.tracking.position.max;
   };
   EXPECT_LT(measure("feedforward_pd"), 1e-7);  // measured 3e-9
   EXPECT_LT(measure("impedance"), 1e-7);       // measured 3e-9

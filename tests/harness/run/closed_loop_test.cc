@@ -88,7 +88,7 @@ Discrepancies Measure(const std::string& scenario, const std::vector<std::string
   });
   EXPECT_TRUE(result.failure.empty()) << result.failure;
   worst.slip = run.Worst("fingertip_slip");
-  worst.position = result.tracking.position_max();
+  worst.position = result.tracking.position.max;
   return worst;
 }
 

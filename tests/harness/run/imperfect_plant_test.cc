@@ -115,7 +115,7 @@ TEST_P(KnownCauses, CryNoWolf) {
     EXPECT_FALSE(check.failed) << check.name << " " << check.worst << " " << check.part;
   }
   // It does something: object or joints are no longer where the ideal plant has them.
-  EXPECT_GT(result.tracking.position_max() + result.tracking.joints_max(), 1e-9);
+  EXPECT_GT(result.tracking.position.max + result.tracking.joints.max, 1e-9);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, KnownCauses, ::testing::ValuesIn(kKnown),
@@ -158,7 +158,7 @@ TEST(ImperfectPlant, CurveRealDoesWhatItExpects) {
   ShippedRun run("curve-real", {"duration=3.3"});  // the first push included
   const RunResult& result = run.Run();
   EXPECT_TRUE(Passes(result));
-  EXPECT_GT(result.tracking.position_max(), 1e-4);
+  EXPECT_GT(result.tracking.position.max, 1e-4);
   EXPECT_GE(run.setup().scenario().imperfections.declared.size(), 6U);
 }
 

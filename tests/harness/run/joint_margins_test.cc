@@ -43,7 +43,7 @@ bool IsStable(const std::vector<std::string>& keys, const Change& change = {}) {
         if (step.time > 2.5) late = std::max(late, step.error.joints);
       },
       [] { return false; });
-  return result.failure.empty() && late < 2.0 * early && result.tracking.joints_max() < 0.03;
+  return result.failure.empty() && late < 2.0 * early && result.tracking.joints.max < 0.03;
 }
 
 JointMargins FindMarginsOf(const std::vector<std::string>& keys) {

@@ -33,8 +33,8 @@ TEST(JointMotionRun, PandaReachesToRounding) {
     EXPECT_LE(run.Worst(check), kRounding) << check;
   }
   // Half a step of the way points' jerk, and never nothing: the arm moves.
-  EXPECT_LE(result.tracking.joints_max(), 1e-4);
-  EXPECT_GT(result.tracking.joints_max(), 1e-12);
+  EXPECT_LE(result.tracking.joints.max, 1e-4);
+  EXPECT_GT(result.tracking.joints.max, 1e-12);
   EXPECT_GT(run.step().reading.state.xi.cwiseAbs().maxCoeff(), 0.1);
   // Nothing is held, and nothing is said of it.
   for (const char* check :
@@ -70,7 +70,7 @@ double FindError(double friction, const std::vector<std::string>& overrides) {
   const RunResult& result = runner->result();
   EXPECT_TRUE(Passes(result));
   EXPECT_LE(runner->loop().checks().Find("law_torque").worst, 1e-12);
-  return result.tracking.joints_rms();
+  return result.tracking.joints.rms();
 }
 
 // Compensation is a summand of the law; on a robot that has the friction it takes most of the error away.

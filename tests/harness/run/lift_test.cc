@@ -65,8 +65,8 @@ TEST_F(LiftTest, TakesCarriesAndPutsDown) {
   EXPECT_NEAR(highest_ - start_.z(), 0.15, 1e-4);
   EXPECT_NEAR(Way().x(), 1.0, 1e-4);
   EXPECT_NEAR(Way().tail<2>().norm(), 0.0, 1e-4);
-  EXPECT_LE(result.tracking.position_max(), 1e-4);  // measured 1.3e-7
-  EXPECT_GT(result.tracking.position_max(), 0.0);
+  EXPECT_LE(result.tracking.position.max, 1e-4);  // measured 1.3e-7
+  EXPECT_GT(result.tracking.position.max, 0.0);
   const ClosedLoop& loop = run_->loop();
   for (const CheckRecord& check : loop.checks().model_checks()) EXPECT_LE(check.worst, 1e-10) << check.name;
   // While the hand is far from the object nothing is said of contacts, but that is the smaller part.
@@ -101,7 +101,7 @@ TEST_F(LiftTest, WeighsAHeavierObjectAndLiftsIt) {
   EXPECT_EQ(result.failure, "");
   EXPECT_EQ(ListPhases(task()), kWholeTask);
   EXPECT_NEAR(task().scale(), 1.3, 0.01);
-  EXPECT_LE(result.tracking.position_max(), 1e-4);
+  EXPECT_LE(result.tracking.position.max, 1e-4);
   EXPECT_EQ(result.verdict, Verdict::kDisagreement);
   EXPECT_EQ(result.attribution.cause, Cause::kModel);
 }
@@ -180,7 +180,7 @@ TEST(HandLiftScenario, TheArmCarriesWhereNoPlatformDrives) {
   EXPECT_NEAR(highest - start.z(), 0.03, 1e-4);
   const Vector3d way = run.step().reading.state.X_Bo.translation() - start;
   EXPECT_NEAR((way - Vector3d(0.0, 0.05, 0.0)).norm(), 0.0, 1e-4);
-  EXPECT_LE(result.tracking.position_max(), 1e-5);  // measured 2.5e-7
+  EXPECT_LE(result.tracking.position.max, 1e-5);  // measured 2.5e-7
   EXPECT_GT(run.loop().checks().Find("fingertip_rim").count, 0);
   // The arm's way is planned from where it takes to where it puts down, and it comes back to where it began.
   const PickPlan& plan = task.plan();

@@ -35,7 +35,7 @@ void ExpectPass(const ShippedRun& run, const RunResult& result) {
 
 void ExpectBondedPass(const ShippedRun& run, const RunResult& result) {
   EXPECT_TRUE(Passes(result));
-  EXPECT_LE(result.tracking.position_max(), 1e-6);
+  EXPECT_LE(result.tracking.position.max, 1e-6);
   EXPECT_LE(run.Worst("reduced_acceleration"), 1e-5);
   EXPECT_LE(run.Worst("contact_force"), 1e-6);
   EXPECT_LE(run.Worst("fingertip_slip"), 1e-5);  // measured 1.2e-6: the bonds' give
@@ -47,8 +47,8 @@ TEST(ShippedScenarios, PaperFollowsTheLine) {
   ShippedRun run("paper");
   const RunResult& result = run.Run();
   ExpectPass(run, result);
-  EXPECT_LE(result.tracking.position_max(), 1e-8);     // measured 8e-11
-  EXPECT_LE(result.tracking.orientation_max(), 1e-6);  // measured 6e-10
+  EXPECT_LE(result.tracking.position.max, 1e-8);     // measured 8e-11
+  EXPECT_LE(result.tracking.orientation.max, 1e-6);  // measured 6e-10
   EXPECT_LE(run.Worst("reduced_acceleration"), 1e-5);
   EXPECT_LE(run.Worst("contact_force"), 1e-6);
   EXPECT_LE(run.Worst("idle_joints"), 1e-5);
@@ -60,7 +60,7 @@ TEST(ShippedScenarios, PaperRampEndsAtItsSpeed) {
   ShippedRun run("paper-ramp", {"duration=5"});
   const RunResult& result = run.Run();
   ExpectPass(run, result);
-  EXPECT_LE(result.tracking.position_max(), 1e-7);  // measured 7e-9
+  EXPECT_LE(result.tracking.position.max, 1e-7);  // measured 7e-9
   EXPECT_NEAR(run.step().reading.state.xi[0], 1.0, 1e-4);
 }
 
@@ -68,8 +68,8 @@ TEST(ShippedScenarios, PaperRigidFollowsTheLineToRounding) {
   ShippedRun run("paper-rigid", {"duration=1"});
   const RunResult& result = run.Run();
   ExpectPass(run, result);
-  EXPECT_LE(result.tracking.position_max(), 1e-11);    // measured 5e-13
-  EXPECT_LE(result.tracking.orientation_max(), 1e-9);  // measured 4e-11
+  EXPECT_LE(result.tracking.position.max, 1e-11);    // measured 5e-13
+  EXPECT_LE(result.tracking.orientation.max, 1e-9);  // measured 4e-11
   EXPECT_FALSE(run.loop().checks().Has("traction_use"));
   EXPECT_GT(run.loop().checks().Find("law_torque").count, 0);
 }
@@ -83,8 +83,8 @@ TEST(ShippedScenarios, AHandOnThePandaHoldsTurnsAndCarriesABall) {
     const RunResult& result = run.Run();
     ExpectPass(run, result);
     EXPECT_EQ(run.step().reading.state.q.size(), 23);
-    EXPECT_LE(result.tracking.position_max(), 1e-7);  // measured 5e-9
-    EXPECT_LE(run.Worst("contact_force"), 1e-6);      // measured 2.3e-7
+    EXPECT_LE(result.tracking.position.max, 1e-7);  // measured 5e-9
+    EXPECT_LE(run.Worst("contact_force"), 1e-6);    // measured 2.3e-7
     const Pose& end = run.step().reading.state.X_Bo;
     const double turned = LogSo3(start.linear().transpose() * end.linear()).norm();
     const double moved = (end.translation() - start.translation()).norm();
@@ -115,8 +115,8 @@ TEST(ShippedScenarios, CurveTurnsWithItsPath) {
       run.Run([&] { largest_turn = std::max(largest_turn, std::abs(run.step().reading.state.q[2])); });
   ExpectPass(run, result);
   EXPECT_GT(largest_turn, 0.1);
-  EXPECT_LE(result.tracking.position_max(), 1e-6);     // measured 3e-9
-  EXPECT_LE(result.tracking.orientation_max(), 1e-5);  // measured 3e-8
+  EXPECT_LE(result.tracking.position.max, 1e-6);     // measured 3e-9
+  EXPECT_LE(result.tracking.orientation.max, 1e-5);  // measured 3e-8
   EXPECT_LE(run.Worst("reduced_acceleration"), 1e-5);
   EXPECT_LE(run.Worst("contact_force"), 1e-6);
   EXPECT_LE(run.Worst("fingertip_slip"), 2e-4);
@@ -139,7 +139,7 @@ TEST(ShippedScenarios, ReorientRollsTheObjectInPlace) {
   ExpectPass(run, result);
   EXPECT_GT(rolled, 0.03);    // rad around the torus
   EXPECT_LT(platform, 1e-4);  // measured 3e-6
-  EXPECT_LE(result.tracking.position_max(), 1e-6);
+  EXPECT_LE(result.tracking.position.max, 1e-6);
 }
 
 TEST(ShippedScenarios, PaperRestSpinsTheWheels) {
@@ -191,8 +191,8 @@ TEST(ShippedScenarios, TwoHandsRaiseTiltAndTurn) {
   const Vector3d tilt = LogSo3(R * Eigen::AngleAxisd(-turn, Vector3d::UnitZ()).toRotationMatrix());
   EXPECT_NEAR(tilt.z(), 0.0, 1e-6);
   EXPECT_NEAR(tilt.norm(), DegToRad(30.0), 1e-6);
-  EXPECT_LE(result.tracking.position_max(), 1e-6);
-  EXPECT_LE(result.tracking.orientation_max(), 1e-5);
+  EXPECT_LE(result.tracking.position.max, 1e-6);
+  EXPECT_LE(result.tracking.orientation.max, 1e-5);
 }
 
 TEST(ShippedScenarios, OtherGraspsPassToo) {

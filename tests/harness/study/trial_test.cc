@@ -26,10 +26,10 @@ TEST(TrialOfJoints, HasTheErrorsOfTheRun) {
   const TrialResult trial = RunReach(1.05);
   ShippedRun run("panda-reach", {"duration=0.5", "settle=0.1", "mismatch.mass={ panda_link4 = 1.05 }"});
   const TrackingStatistics& tracking = run.Run().tracking;
-  EXPECT_EQ(trial.metrics[kJointErrorRms], tracking.joints_rms());
-  EXPECT_EQ(trial.metrics[kJointErrorMax], tracking.joints_max());
-  EXPECT_GT(tracking.joints_rms(), 1e-4);
-  EXPECT_GT(tracking.joints_max(), tracking.joints_rms());
+  EXPECT_EQ(trial.metrics[kJointErrorRms], tracking.joints.rms());
+  EXPECT_EQ(trial.metrics[kJointErrorMax], tracking.joints.max);
+  EXPECT_GT(tracking.joints.rms(), 1e-4);
+  EXPECT_GT(tracking.joints.max, tracking.joints.rms());
   EXPECT_GT(trial.metrics[kPeakEffort], 0.0);
   EXPECT_GT(trial.metrics[kEnergy], 0.0);
   // Nothing is held.
