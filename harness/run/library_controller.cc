@@ -264,7 +264,8 @@ class LibraryPeer final : public ControllerPeer {
       library_->Guard([&, name = parameter.c_str(), number = value] {
         if (const char* text = set(controller_, name, number)) problem = Abbreviate(text);
       });
-      if (!problem.empty()) throw InputError(setup_.name + ": controller." + parameter + ": " + problem);
+      if (!problem.empty())
+        throw InputError(fmt::format("{}: controller.{}: {}", setup_.name, parameter, problem));
     }
   }
 

@@ -14,6 +14,7 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/machine.h"
 #include "harness/engine/mjcf_file.h"
+#include "harness/run/own_controller.h"
 
 namespace dexcheck {
 namespace {
@@ -118,7 +119,7 @@ LogColumns ListColumns(const mjModel& model, const std::vector<std::string>& pla
 /// accelerations.
 std::string ListJointUnits(const RobotModel& model, const std::vector<std::string>& base, const char* per) {
   std::vector<std::string> units;
-  for (const std::string& unit : base) units.push_back(unit + per);
+  std::ranges::transform(base, std::back_inserter(units), [&](const auto& unit) { return unit + per; });
   for (const Joint& joint : model.joints()) {
     units.push_back((joint.type == JointType::kRevolute ? "rad" : "m") + std::string(per));
   }
@@ -369,7 +370,7 @@ void RunRecorder::AddCheckSignals() {
   std::set<PairClass> classes;
   for (const WatchedPair& pair : clearance.pairs()) classes.insert(pair.pairs);
   std::vector<std::string> names;
-  for (const PairClass pairs : classes) names.emplace_back(NameOf(pairs));
+  std::ranges::transform(classes, std::back_inserter(names), [](PairClass pairs) { return NameOf(pairs); });
   if (!classes.empty()) {
     Add("clearance/smallest", "m", "smallest distance so far of bodies that must not touch", names,
         [&clearance, classes](const StepRecord& /*step*/, Row row) {
