@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/json_matrix.h"
 #include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
@@ -18,8 +18,6 @@
 
 namespace dexcheck::cli {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 struct AuditRequest {
   std::filesystem::path robot;
@@ -113,9 +111,9 @@ int Run(const AuditRequest& request) {
 }  // namespace
 
 void AddAuditCommand(Command app) {
-  const auto request = std::make_shared<AuditRequest>();
-  Command command =
-      app.AddCommand("audit", "Look for what cannot be, or is suspicious, in one description of a robot");
+  auto [command, request] = app.AddRequest<AuditRequest>(
+      "audit", "Look for what cannot be, or is suspicious, in one description of a robot",
+      {"dexcheck audit arm.urdf", "dexcheck audit arm.xml --junit audit.xml"});
   command.AddOption("FILE", &request->robot, "Parameter file (TOML), URDF or MJCF")
       .TypeName("FILE")
       .Required();
@@ -123,7 +121,6 @@ void AddAuditCommand(Command app) {
   AddJsonOption(command, "the findings", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
-  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

@@ -83,9 +83,9 @@ int Run(const BudgetRequest& request) {
 }  // namespace
 
 void AddBudgetCommand(Command app) {
-  const auto request = std::make_shared<BudgetRequest>();
-  Command command = app.AddCommand(
-      "budget", "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all");
+  auto [command, request] = app.AddRequest<BudgetRequest>(
+      "budget", "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all",
+      {"dexcheck budget curve-real", "dexcheck budget motion.toml --set duration=2"});
   command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();
   AddOverrideOptions(command, &request->overrides);
   AddSeedOption(command, &request->seed, "Seed of all that is random");
@@ -93,7 +93,6 @@ void AddBudgetCommand(Command app) {
   AddJobsOption(command, "Runs", &request->jobs);
   AddJsonOption(command, "the budget", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the last line only");
-  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

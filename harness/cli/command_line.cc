@@ -9,7 +9,6 @@
 #include "controller/common/text.h"
 #include "harness/base/console.h"
 #include "harness/base/files.h"
-#include "harness/cli/help_examples.h"
 #include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
@@ -92,10 +91,6 @@ Option& Option::ShowDefault() {
   return *this;
 }
 
-bool Option::is_given() const { return option_->count() > 0; }
-
-std::string Option::name() const { return option_->get_name(); }
-
 template <typename Value>
 Option Command::AddOption(const std::string& name, Value* value, const std::string& help) {
   const size_t blank = name.find(' ');
@@ -118,13 +113,16 @@ Command Command::Under(const std::string& heading) const {
   return command;
 }
 
-Command Command::AddCommand(const std::string& name, const std::string& help) {
+Command Command::AddCommand(const std::string& name, const std::string& help,
+                            const std::array<const char*, 2>& examples) {
   CLI::App* const command = app_->add_subcommand(name, help);
   // Which it would have of the program otherwise.
   command->group(heading_.empty() ? "Subcommands" : heading_);
-  command->footer(FindExamples((app_->get_parent() != nullptr ? app_->get_name() + " " : "") + name));
+  command->footer(std::string("Examples:\n  ") + examples[0] + "\n  " + examples[1]);
   return {command, exit_code_};
 }
+
+bool Command::is_given(const std::string& option) const { return app_->count(option) > 0; }
 
 void Command::RequireCommand() { app_->require_subcommand(1); }
 

@@ -3,12 +3,14 @@
 // The command line's words: commands, options, flags. CLI11 reads them; it consists of headers that cost each
 // source which includes them ten seconds, so that only command_line.cc does.
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <initializer_list>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace CLI {
@@ -61,9 +63,6 @@ class Option {
   Option& Delimiter(char delimiter);
   /// The help prints the value that the variable has now.
   Option& ShowDefault();
-  /// Whether the command line has it.
-  [[nodiscard]] bool is_given() const;
-  [[nodiscard]] std::string name() const;  ///< "--out"
 
  private:
   friend class Command;
@@ -86,7 +85,21 @@ class Command {
 
   /// This command again, whose next commands stand under this heading in the help.
   [[nodiscard]] Command Under(const std::string& heading) const;
-  Command AddCommand(const std::string& name, const std::string& help);
+  /// @param examples two lines to type, which its help shows.
+  Command AddCommand(const std::string& name, const std::string& help,
+                     const std::array<const char*, 2>& examples);
+  /// Adds a command whose options fill a request: when it is given, the function Run of the request's own
+  /// namespace is called with it. @returns both.
+  template <typename Request>
+  std::pair<Command, Request*> AddRequest(const std::string& name, const std::string& help,
+                                          const std::array<const char*, 2>& examples) {
+    const auto request = std::make_shared<Request>();
+    Command command = AddCommand(name, help, examples);
+    command.SetAction([request] { return Run(*request); });
+    return {command, request.get()};
+  }
+  /// Whether the command line has this option of the command, "--out".
+  [[nodiscard]] bool is_given(const std::string& option) const;
   /// One of its commands must be given.
   void RequireCommand();
   /// Sets the function that runs when the command is given; its exit code is the program's. @throws

@@ -136,32 +136,6 @@ inline std::array<Option, 2> AddToleranceOptions(Command command, ToleranceOptio
   return {digits, tolerance};
 }
 
-/// A comparison: its two sides, and where the results go.
-struct ComparisonRequest {
-  RobotFiles files;
-  UrdfOptions urdf;
-  ToleranceOptions judging;
-  std::string json_file;
-  std::string junit_file;
-  bool quiet = false;
-
-  /// Takes the shipped pair where no file was given. @param command for messages.
-  /// @throws InputError when one file was given.
-  void TakeFiles(const std::string& command) {
-    files.TakeShipped();
-    if (files.robot.empty()) throw InputError(command + ": B needs A, the file that may be wrong");
-    if (files.mjcf.empty()) {
-      throw InputError(command + ": takes two files, got " + files.robot.string() +
-                       "; init, audit, judge take one");
-    }
-  }
-  /// To what two files agree.
-  [[nodiscard]] std::string DescribeTolerance() const {
-    const std::optional<double> tolerance = judging.Find();
-    return tolerance ? FormatNumber(*tolerance, 6) : "rounding";
-  }
-};
-
 /// Two recordings against each other, by a model of the robot.
 struct RecordingPair {
   std::filesystem::path model, first, second, columns;
@@ -171,5 +145,9 @@ struct RecordingPair {
 
 /// Prints how far they are apart and what differs. @return the exit code: 1 where something differs.
 int CompareTwoRecordings(const RecordingPair& pair);
+
+/// Makes the video of a run as `dexcheck run --video` does: with contact forces. @return false when the user
+/// stopped it; nothing is then written. @throws InputError when the file cannot be written.
+bool WriteRunVideo(const std::filesystem::path& run_folder, const std::string& out, bool quiet);
 
 }  // namespace dexcheck::cli

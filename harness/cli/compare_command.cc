@@ -99,7 +99,8 @@ void Print(const CompareRequest& request, const RunComparison& comparison) {
   PrintSignals(comparison, request.all);
 }
 
-int Run(const CompareRequest& request) {
+int Run(CompareRequest request) {
+  request.options.tolerance = request.tolerance.value_or(0.0);
   if (!request.model.empty()) {
     if (request.run_folders.size() != 2) throw InputError("--model: needs two recordings");
     return CompareTwoRecordings({request.model, request.run_folders[0], request.run_folders[1],
@@ -132,10 +133,10 @@ int Run(const CompareRequest& request) {
 }  // namespace
 
 void AddCompareCommand(Command app) {
-  const auto request = std::make_shared<CompareRequest>();
-  Command command = app.AddCommand(
-      "compare",
-      "Compare runs: inputs, results, checks and signals; or, with --model, recordings of a robot");
+  auto [command, request] = app.AddRequest<CompareRequest>(
+      "compare", "Compare runs: inputs, results, checks and signals; or, with --model, recordings of a robot",
+      {"dexcheck compare run_a run_b --page comparison.html",
+       "dexcheck compare run_a run_b --tolerance 1e-9"});
   command
       .AddOption("RUN_DIR", &request->run_folders,
                  "Folders of runs, or recordings; the first is what the others are compared with")
@@ -159,10 +160,6 @@ void AddCompareCommand(Command app) {
   AddJsonOption(command, "the numbers", &request->json);
   command.AddFlag("--all", &request->all, "Print all checks and signals");
   command.AddFlag("--quiet", &request->quiet, "Print the last line only");
-  command.SetAction([=] {
-    request->options.tolerance = request->tolerance.value_or(0.0);
-    return Run(*request);
-  });
 }
 
 }  // namespace dexcheck::cli

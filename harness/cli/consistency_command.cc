@@ -4,14 +4,13 @@
 #include <array>
 #include <cstdint>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 
 #include "controller/common/errors.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/file_repair.h"
+#include "harness/cli/consistency_report.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/comparison/consistency.h"
@@ -33,7 +32,7 @@ void TakeFiles(ConsistencyRequest* request) {
 std::string MakePage(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {
   const DescriptionFile first(request.files.robot, request.urdf);
   const DescriptionFile second(request.files.mjcf, request.urdf);
-  nlohmann::ordered_json result = ToJson(request, comparison, code);
+  Json result = ToJson(request, comparison, code);
   for (size_t i = 0; i < result["causes"].size(); ++i) {
     for (const Site& site : comparison.causes->items[i].sites)
       result["causes"][i]["sites"].push_back(NameSite(site.kind));
@@ -84,7 +83,9 @@ int Run(ConsistencyRequest request) {
 void AddConsistencyCommand(Command app) {
   constexpr std::uint64_t kMaxSamples = 1000000000;
   const auto request = std::make_shared<ConsistencyRequest>();
-  Command command = app.AddCommand("consistency", "Compare every term of model and engine at random states");
+  Command command = app.AddCommand("consistency", "Compare every term of model and engine at random states",
+                                   {"dexcheck arm.urdf arm.xml --page files.html",
+                                    "dexcheck consistency arm.urdf --program 'python3 mine.py'"});
   AddFileOptions(command, "A description of a robot: parameter file (TOML), URDF or MJCF",
                  "Another one of the same robot; without both, the shipped pair", &request->files);
   const Option program = command.AddOption(

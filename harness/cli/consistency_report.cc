@@ -18,8 +18,6 @@
 namespace dexcheck::cli {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 /// How two descriptions agree, or that they do not.
 const char* NameOutcome(const ConsistencyRequest& request, const Comparison& comparison) {
   if (!comparison.Agrees()) return "differ";

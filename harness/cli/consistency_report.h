@@ -2,18 +2,26 @@
 
 // The request of `consistency`, its results, and how they are printed.
 
-#include <nlohmann/json.hpp>
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "harness/base/answer.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/json_matrix.h"
 #include "harness/comparison/file_comparison.h"
 
 namespace dexcheck::cli {
 
 /// The two sides of a comparison, and the number of states.
-struct ConsistencyRequest : ComparisonRequest {
+struct ConsistencyRequest {
+  RobotFiles files;
+  UrdfOptions urdf;
+  ToleranceOptions judging;
+  std::string json_file;
+  std::string junit_file;
+  bool quiet = false;
   ResultsSource source;  ///< What stands for B and provides terms.
   ConsistencyOptions options;
   std::string page_file;            ///< Where the page of two files goes; empty for none.
@@ -22,6 +30,21 @@ struct ConsistencyRequest : ComparisonRequest {
   bool exact = false;               ///< Two files agree to rounding only, whatever digits they print.
   double precision = 1.0;           ///< Coarsest printed precision that counts as agreement, per cent.
 
+  /// Takes the shipped pair where no file was given. @param command for messages.
+  /// @throws InputError when one file was given.
+  void TakeFiles(const std::string& command) {
+    files.TakeShipped();
+    if (files.robot.empty()) throw InputError(command + ": B needs A, the file that may be wrong");
+    if (files.mjcf.empty()) {
+      throw InputError(command + ": takes two files, got " + files.robot.string() +
+                       "; init, audit, judge take one");
+    }
+  }
+  /// To what two files agree.
+  [[nodiscard]] std::string DescribeTolerance() const {
+    const std::optional<double> tolerance = judging.Find();
+    return tolerance ? FormatNumber(*tolerance, 6) : "rounding";
+  }
   /// Returns whether B is a source of terms, and no description.
   [[nodiscard]] bool has_results() const { return !source.program.empty() || !source.results.empty(); }
   /// Whether all states were compared; results in files have their own, and files of other joints none.
@@ -41,7 +64,7 @@ Comparison Compare(const ConsistencyRequest& request, DescriptionFile* robot, De
                    const Progress& progress);
 
 /// A compared term or constant: its record, where it was worst, and the two values there.
-nlohmann::ordered_json DescribeRecord(const CheckRecord& record, const RobotModel& model);
+Json DescribeRecord(const CheckRecord& record, const RobotModel& model);
 
 /// Large results first fail, then where to look: what a person reads.
 void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);
@@ -51,15 +74,18 @@ struct RepairTrial {
   std::string left = {};     ///< What would still differ; empty for nothing, or where none can be written.
 };
 
+/// Repairs the file in which the causes are in memory, and compares it again.
+RepairTrial TryRepair(const ConsistencyRequest& request, const Comparison& comparison);
+
 /// Returns whether the two agree, and if not, why.
 Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& comparison, const RepairTrial& repair);
 /// Returns the results as JSON.
-nlohmann::ordered_json ToJson(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
+Json ToJson(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
 
 /// Writes the results as a JUnit document.
 std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comparison);
 
 /// Adds "causes" and "unexplained", which is all that differs where terms alone are compared.
-void AddCauses(const Comparison& comparison, nlohmann::ordered_json* json);
+void AddCauses(const Comparison& comparison, Json* json);
 
 }  // namespace dexcheck::cli

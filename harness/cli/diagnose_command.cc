@@ -4,26 +4,67 @@
 #include <optional>
 #include <string>
 
+#include "controller/common/errors.h"
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
-#include "harness/cli/file_repair.h"
+#include "harness/cli/consistency_report.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/comparison/file_differences.h"
+#include "harness/corrections/read_printed.h"
+#include "harness/corrections/write_repaired.h"
 #include "harness/engine/mjcf_file.h"
 
 namespace dexcheck::cli {
+namespace {
+
+/// Returns the text of `file` with the causes corrected by which it differs from `other`.
+/// @param folder in which the text will stand. @throws InputError for what its format has no place for.
+RepairedFile Repair(const ConsistencyRequest& request, const DescriptionFile& file,
+                    const DescriptionFile& other, const std::filesystem::path& folder) {
+  PrintedRobot printed = ReadPrintedRobot(file), reference = ReadPrintedRobot(other);
+  for (PrintedRobot* const robot : {&printed, &reference}) LeaveOutUnstated(request.ignore, robot);
+  LeaveOutUnshared(&printed, &reference);
+  return WriteRepaired(file, request.urdf, printed, reference, folder);
+}
+
+}  // namespace
+
+RepairTrial TryRepair(const ConsistencyRequest& request, const Comparison& comparison) {
+  constexpr int kStates = 50;
+  if (!comparison.causes || comparison.causes->items.empty()) return {};
+  const bool of_second = comparison.causes->of_second;
+  const std::filesystem::path& path = of_second ? request.files.mjcf : request.files.robot;
+  const std::filesystem::path& other = of_second ? request.files.robot : request.files.mjcf;
+  try {
+    const DescriptionFile file(path, request.urdf);
+    DescriptionFile reference(other, request.urdf);
+    RepairedFile repaired = Repair(request, file, reference, path.parent_path());
+    if (!repaired.agrees || repaired.text == file.text()) return {};
+    DescriptionFile written(path, std::move(repaired.text), request.urdf);
+    ConsistencyRequest short_request = request;
+    short_request.options.samples = kStates;
+    const Comparison again = Compare(short_request, &written, &reference, [](long) { return true; });
+    if (!again.Agrees()) return {"", ListDifferences(again).front()};
+  } catch (const InputError&) {
+    return {};
+  }
+  return {fmt::format("dexcheck diagnose {} {} --write FILE", QuoteForShell(path.string()),
+                      QuoteForShell(other.string())),
+          ""};
+}
+
 namespace {
 
 struct DiagnoseRequest : ConsistencyRequest {
   std::string repaired_file;
 };
 
-nlohmann::ordered_json ToJson(const DiagnoseRequest& request, const Comparison& comparison) {
-  nlohmann::ordered_json json = {{"robot", request.files.robot.string()},
-                                 {"mjcf", request.files.mjcf.string()},
-                                 {"mujoco", mj_versionString()},
-                                 {"verdict", comparison.Agrees() ? "pass" : "disagreement"}};
+Json ToJson(const DiagnoseRequest& request, const Comparison& comparison) {
+  Json json = {{"robot", request.files.robot.string()},
+               {"mjcf", request.files.mjcf.string()},
+               {"mujoco", mj_versionString()},
+               {"verdict", comparison.Agrees() ? "pass" : "disagreement"}};
   if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
   json["notes"] = ListLoadNotes();
   for (const std::string& note : comparison.notes) json["notes"].push_back(note);
@@ -91,12 +132,13 @@ int Run(DiagnoseRequest request) {
 }  // namespace
 
 void AddDiagnoseCommand(Command app) {
-  const auto request = std::make_shared<DiagnoseRequest>();
-  Command command = app.AddCommand("diagnose", "Say why two descriptions differ, and repair the first");
+  auto [command, request] = app.AddRequest<DiagnoseRequest>(
+      "diagnose", "Say why two descriptions differ, and repair the first",
+      {"dexcheck diagnose arm.urdf arm.xml", "dexcheck diagnose arm.urdf arm.xml --write repaired.urdf"});
   AddFileOptions(command, "The description that may be wrong: parameter file (TOML), URDF or MJCF",
                  "Another one of the same robot; without both, the shipped pair", &request->files);
   AddUrdfOptions(command, &request->urdf);
-  AddJudgingOptions(command, request.get());
+  AddJudgingOptions(command, request);
   AddIgnoreOption(command, &request->ignore);
   const auto is_file = [](const std::string& name) {
     return name == "-" ? "must be a file, got -" : std::string();
@@ -109,7 +151,6 @@ void AddDiagnoseCommand(Command app) {
       .Check(is_file);
   AddJsonOption(command, "the results", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "No progress");
-  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -19,8 +18,6 @@
 
 namespace dexcheck::cli {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 struct EnginesRequest {
   std::filesystem::path robot;
@@ -190,10 +187,10 @@ int Run(EnginesRequest request) {
 }  // namespace
 
 void AddEngineComparisonCommand(Command app) {
-  const auto request = std::make_shared<EnginesRequest>();
+  auto [command, request] = app.AddRequest<EnginesRequest>(
+      "engines", "Compare one robot's terms in several physics engines, pair by pair",
+      {"dexcheck engines arm.urdf", "dexcheck engines arm.urdf --engine 'mine=python3 mine.py'"});
   request->options.states.samples = 100;
-  Command command =
-      app.AddCommand("engines", "Compare one robot's terms in several physics engines, pair by pair");
   command.AddOption("ROBOT", &request->robot, "URDF; with fewer engines an MJCF or a parameter file (TOML)")
       .TypeName("FILE")
       .Required();
@@ -221,7 +218,6 @@ void AddEngineComparisonCommand(Command app) {
   AddJUnitOption(command, &request->junit_file);
   AddIgnoreOption(command, &request->options.states.ignore);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
-  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

@@ -406,9 +406,10 @@ int Run(const EvalRequest& request) {
 
 void AddEvalCommand(Command app) {
   constexpr long kMostStates = 1000000;
-  const auto request = std::make_shared<EvalRequest>();
-  Command command = app.AddCommand(
-      "eval", "Print every term at one state, as JSON; or write random states for your own program");
+  auto [command, request] = app.AddRequest<EvalRequest>(
+      "eval", "Print every term at one state, as JSON; or write random states for your own program",
+      {"dexcheck eval arm.toml arm.xml --state state.json",
+       "dexcheck eval arm.urdf --states 1000 --out states"});
   const Option robot = command.AddOption(
       "ROBOT,--robot", &request->robot,
       "Parameter file (TOML) of the analytic model, the shipped one by default; with --states a URDF or an "
@@ -438,7 +439,6 @@ void AddEvalCommand(Command app) {
                             .Excludes(json);
   AddSeedOption(command, &request->seed, "Seed of the random states").ShowDefault().Needs(states);
   AddUrdfOptions(command, &request->urdf);
-  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

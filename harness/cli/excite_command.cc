@@ -125,9 +125,9 @@ int Run(MotionRequest request) {
 }  // namespace
 
 void AddExciteCommand(Command app) {
-  const auto request = std::make_shared<MotionRequest>();
-  Command command = app.AddCommand(
-      "excite", "Make a motion to record with a robot, in which errors of its model show best within limits");
+  auto [command, request] = app.AddRequest<MotionRequest>(
+      "excite", "Make a motion to record with a robot, in which errors of its model show best within limits",
+      {"dexcheck excite arm.urdf --out motion.csv", "dexcheck excite arm.urdf --limits limits.toml"});
   command.AddOption("MODEL,--model", &request->model, "The robot: a parameter file, URDF or MJCF").Required();
   command.AddOption("--out FILE.csv", &request->motion_file,
                     "The motion: t, q, qd, qdd and the model's torques");
@@ -149,7 +149,6 @@ void AddExciteCommand(Command app) {
   AddSeedOption(command, &request->options.seed, "Of the motions that are drawn at first");
   AddJsonOption(command, "the results", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the last line only");
-  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

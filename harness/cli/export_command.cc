@@ -13,6 +13,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
@@ -160,8 +161,8 @@ void PrintList(const LogReader& log, const std::vector<SignalInfo>& signals) {
   }
 }
 
-nlohmann::ordered_json ToJson(const LogReader& log, const std::vector<SignalInfo>& signals) {
-  nlohmann::ordered_json json = {{"rows", log.rows()}, {"signals", nlohmann::ordered_json::array()}};
+Json ToJson(const LogReader& log, const std::vector<SignalInfo>& signals) {
+  Json json = {{"rows", log.rows()}, {"signals", Json::array()}};
   for (const SignalInfo& signal : signals) {
     json["signals"].push_back({{"name", signal.name},
                                {"width", signal.width},
@@ -192,9 +193,9 @@ int Run(const ExportRequest& request) {
 }  // namespace
 
 void AddExportCommand(Command app) {
-  const auto request = std::make_shared<ExportRequest>();
-  Command command =
-      app.AddCommand("export", "Write a run's log as a table of numbers (CSV) or as messages (MCAP)");
+  auto [command, request] = app.AddRequest<ExportRequest>(
+      "export", "Write a run's log as a table of numbers (CSV) or as messages (MCAP)",
+      {"dexcheck export my_run --list", "dexcheck export my_run --csv run.csv --signals 'object/*,tau'"});
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run, with its log.h5").Required();
   Option csv =
       command.AddOption("--csv FILE.csv", &request->csv_file, "File to write (- for standard output)");
@@ -212,7 +213,6 @@ void AddExportCommand(Command app) {
       .Excludes(csv)
       .Excludes(mcap);
   AddJsonOption(command, "what --list prints", &request->json_file);
-  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

@@ -78,14 +78,18 @@ std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
 }  // namespace
 
 void AddHelpCommands(Command app, const CommandLine& line) {
-  Command completion = app.AddCommand("completion", "Print completion for a shell, made from the help");
+  Command completion =
+      app.AddCommand("completion", "Print completion for a shell, made from the help",
+                     {"dexcheck completion bash > ~/.local/share/bash-completion/completions/dexcheck",
+                      "source <(dexcheck completion bash)"});
   const auto shell = std::make_shared<std::string>();
   completion.AddOption("SHELL", shell.get(), "bash").Required().OneOf({"bash"});
   completion.SetAction([&line, shell] {
     fmt::print("{}", MakeBashCompletion(line.Describe()));
     return kSuccess;
   });
-  Command version = app.AddCommand("version", "Print the versions of dexcheck and of its engine");
+  Command version = app.AddCommand("version", "Print the versions of dexcheck and of its engine",
+                                   {"dexcheck version", "dexcheck version > versions.txt"});
   version.SetAction([] {
     fmt::print("dexcheck {}\nMuJoCo {} (compiled with the headers of {})\n", Version(),
                FormatRelease(mj_version()), FormatRelease(mjVERSION_HEADER));

@@ -99,9 +99,9 @@ int Run(const ImportRequest& request) {
 }  // namespace
 
 void AddImportCommand(Command app) {
-  const auto request = std::make_shared<ImportRequest>();
-  Command command =
-      app.AddCommand("import", "Write a parameter file (TOML) from a URDF or an MJCF, to start from");
+  auto [command, request] = app.AddRequest<ImportRequest>(
+      "import", "Write a parameter file (TOML) from a URDF or an MJCF, to start from",
+      {"dexcheck import arm.urdf --out arm.toml", "dexcheck import newer.xml --downgrade --out arm.xml"});
   command.AddOption("FILE", &request->source, "URDF or MJCF").Required();
   command.AddOption("--out FILE.toml", &request->out, "File to write (- for standard output)").ShowDefault();
   AddUrdfOptions(command, &request->urdf);
@@ -113,7 +113,6 @@ void AddImportCommand(Command app) {
                   "Write an MJCF instead: a copy with a torque motor for each joint, as run needs it, in the "
                   "place of all actuators");
   AddJsonOption(command, "what was read, and what was left out or changed", &request->json_file);
-  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

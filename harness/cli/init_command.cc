@@ -225,10 +225,9 @@ int Run(const InitRequest& request) {
 }  // namespace
 
 void AddInitCommand(Command app) {
-  const auto request = std::make_shared<InitRequest>();
-  Command command = app.AddCommand(
-      "init",
-      "Make a folder to start from: parameters, MJCF with motors, a motion, a study of its gains, CI");
+  auto [command, request] = app.AddRequest<InitRequest>(
+      "init", "Make a folder to start from: parameters, MJCF with motors, a motion, a study of its gains, CI",
+      {"dexcheck init arm.urdf arm.xml --out my_arm", "dexcheck init --from panda-reach"});
   const Option robot =
       command.AddOption("ROBOT", &request->robot, "URDF or MJCF of a robot").TypeName("FILE");
   command
@@ -240,7 +239,6 @@ void AddInitCommand(Command app) {
       .Excludes(robot);
   command.AddOption("--out DIR", &request->out,
                     "Folder to make; named after the robot or scenario by default");
-  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

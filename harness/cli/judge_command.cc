@@ -285,9 +285,10 @@ int CompareTwoRecordings(const RecordingPair& pair) {
 }
 
 void AddJudgeCommand(Command app) {
-  const auto request = std::make_shared<JudgeRequest>();
-  Command command =
-      app.AddCommand("judge", "Say whether a model explains a recording of a robot, and what is missing");
+  auto [command, request] = app.AddRequest<JudgeRequest>(
+      "judge", "Say whether a model explains a recording of a robot, and what is missing",
+      {"dexcheck judge arm.urdf recording.csv --page judged.html",
+       "dexcheck judge arm.urdf recording.csv --columns columns.toml"});
   command.AddOption("MODEL", &request->model, "Parameter file, URDF or MJCF").Required();
   command.AddOption(
       "RECORDING", &request->recording,
@@ -305,7 +306,6 @@ void AddJudgeCommand(Command app) {
   command.AddOption("--page FILE.html", &request->page_file,
                     "Write a page that loads nothing: torques, residuals, causes");
   command.AddFlag("--quiet", &request->quiet, "No progress, and causes and verdict only");
-  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

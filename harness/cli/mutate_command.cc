@@ -1,7 +1,10 @@
 #include <fmt/format.h>
 
+#include <array>
+#include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -9,20 +12,25 @@
 #include "harness/base/interrupts.h"
 #include "harness/cli/campaign_table.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/mutate_run.h"
 #include "harness/cli/output_file.h"
+#include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
 #include "harness/diagnosis/formula_mutants.h"
 #include "harness/engine/engine.h"
+#include "harness/report/page.h"
+#include "harness/run/run_mutation.h"
 
 namespace dexcheck::cli {
 namespace {
 
 struct MutateRequest {
-  MutateRunRequest run;  // with a scenario, faults are made in its run
-  RobotFiles files;
+  RobotFiles files;  // or a scenario in the place of the robot, in whose run faults are made
   MutationOptions options;
+  Overrides overrides;
+  RunMutationOptions run;
   std::optional<double> duration;
+  std::string page_file;  // empty for none
+  std::uint64_t jobs = 0;
   bool no_diagnosis = false;
   std::string json_file;
   bool quiet = false;
@@ -62,19 +70,8 @@ CampaignFault Describe(const FormulaMutant& mutant) {
   return fault;
 }
 
-/// Makes faults in a run of the scenario that stands in the place of two files.
-int RunInScenario(MutateRequest request) {
-  request.run.scenario = request.files.robot;
-  request.run.options.scale = request.options.scale;
-  const bool draws = request.run.options.draws > 0;
-  request.run.options.looks_on = !request.duration && !draws;
-  request.run.options.duration = request.duration.value_or(draws ? 0.0 : request.run.options.duration);
-  request.run.json_file = request.json_file;
-  request.run.quiet = request.quiet;
-  return MutateRun(request.run);
-}
-
-int Run(MutateRequest request) {
+/// Makes faults in two descriptions.
+int MutateFiles(MutateRequest request) {
   request.files.TakeShipped();
   request.options.diagnose = !request.no_diagnosis;
   const DescriptionFile robot(request.files.robot);
@@ -108,7 +105,7 @@ int Run(MutateRequest request) {
                              {"seed", request.options.seed}}};
   campaign.Resume(request.json_file, {request.files.robot, request.files.mjcf});
   ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet);
-  campaign.Make(request.run.jobs, &bar, [&](size_t i) {
+  campaign.Make(request.jobs, &bar, [&](size_t i) {
     if (i < formulas.size()) {
       RunFormulaMutant(adapter, request.options.samples, &formulas[i]);
       return Describe(formulas[i]);
@@ -123,82 +120,188 @@ int Run(MutateRequest request) {
   return campaign.ToExitCode();
 }
 
+/// Describes what the table does not say: that a fault was not found, or that its cause or name is another.
+std::string DescribeException(const RunMutant& mutant) {
+  const std::string& name = mutant.all.name;
+  if (mutant.refused) return fmt::format("refused: {}: {}", name, mutant.failure);
+  if (mutant.no_effect) return "no effect: " + name;
+  if (!mutant.killed) return "survived: " + name;
+  if (mutant.faults.size() == 1 && !mutant.has_right_cause()) {
+    return fmt::format("cause: {}: expected {}, named {} ({})", name, NameOf(mutant.all.cause),
+                       NameOf(mutant.cause), mutant.evidence);
+  }
+  if (mutant.is_named()) return "";
+  if (mutant.all.truth.empty())
+    return fmt::format("part: {}: expected {}, named {}", name, mutant.all.part, mutant.evidence);
+  const char* const outcome = mutant.score.wrong > 0      ? "WRONG NAME"
+                              : mutant.score.in_class > 0 ? "class"
+                                                          : "not explained";
+  return fmt::format("{}: {}: {}", outcome, name, mutant.causes);
+}
+
+CampaignFault Describe(const RunMutant& mutant) {
+  CampaignFault fault{.kind = mutant.all.kind, .name = mutant.all.name};
+  fault.outcome = mutant.refused     ? MutantOutcome::kRefused
+                  : mutant.no_effect ? MutantOutcome::kNoEffect
+                  : mutant.killed    ? MutantOutcome::kKilled
+                                     : MutantOutcome::kSurvived;
+  const bool counts = !mutant.refused && !mutant.no_effect;
+  fault.cause_right = counts && (mutant.faults.size() > 1 ? mutant.is_named() : mutant.has_right_cause());
+  if (counts && !(mutant.all.truth.empty() && mutant.all.part.empty())) fault.part_named = mutant.is_named();
+  fault.exception = DescribeException(mutant);
+  fault.details = {{"expected_cause", NameOf(mutant.all.cause)},
+                   {"cause", NameOf(mutant.cause)},
+                   {"expected_part", mutant.all.part},
+                   {"evidence", mutant.evidence},
+                   {"failure", mutant.failure},
+                   {"failed_checks", mutant.failed_checks},
+                   {"position_error_max_m", mutant.position_error},
+                   {"causes", mutant.causes},
+                   {"right", mutant.score.right},
+                   {"in_class", mutant.score.in_class},
+                   {"not_explained", mutant.score.not_explained},
+                   {"wrong", mutant.score.wrong},
+                   {"as_alone", mutant.is_as_alone()}};
+  for (size_t i = 0; i < mutant.truth.size(); ++i)
+    fault.details["names"].push_back({{"injected", mutant.truth[i].fault},
+                                      {"place", mutant.truth[i].place},
+                                      {"named", mutant.score.named_as[i]}});
+  return fault;
+}
+
+/// Prints for drawn faults, by the number of those of a set that are found alone, how many are named, and in
+/// how many sets each is named as well as when it is alone.
+void PrintScores(const Campaign& campaign, int together) {
+  constexpr const char* kNames[] = {"right", "in_class", "not_explained", "wrong"};
+  struct Count {
+    int sets = 0, all_right = 0, as_alone = 0, of[4] = {};
+  };
+  std::map<int, Count> counts;
+  for (const CampaignFault& fault : campaign.faults) {
+    if (fault.outcome != MutantOutcome::kKilled) continue;
+    int of[std::size(kNames)] = {};
+    for (size_t k = 0; k < std::size(kNames); ++k) of[k] = fault.details[kNames[k]].get<int>();
+    Count& count = counts[of[0] + of[1] + of[2]];
+    ++count.sets;
+    count.all_right += static_cast<int>(of[1] + of[2] + of[3] == 0);
+    count.as_alone += static_cast<int>(fault.details["as_alone"].get<bool>());
+    for (size_t k = 0; k < std::size(kNames); ++k) count.of[k] += of[k];
+  }
+  for (const auto& [size, one] : counts) {
+    const std::string alone = together > 1 ? fmt::format(", each as well as alone in {}", one.as_alone) : "";
+    fmt::print(
+        "{} sets of {}: all named in {}{}; of their faults {} named, {} up to a class, {} not explained; {} "
+        "wrong names.\n",
+        one.sets, size, one.all_right, alone, one.of[0], one.of[1], one.of[2], one.of[3]);
+  }
+}
+
+/// Makes faults in the run of a scenario.
+int MutateRun(const MutateRequest& request) {
+  RunMutationOptions options = request.run;
+  options.scale = request.options.scale;
+  options.looks_on = !request.duration && options.draws == 0;
+  options.duration = request.duration.value_or(options.draws > 0 ? 0.0 : options.duration);
+  const ScenarioFiles files = FindScenario(request.files.robot, request.overrides.List(), /*seed=*/0);
+  CatchInterrupts();
+  ResultFile json(request.json_file), page(request.page_file);
+  RunCampaign runs(files.scenario, files.robot, files.mjcf, options, IsInterrupted);
+  Campaign campaign{.faults = {},
+                    .total = runs.mutants().size(),
+                    .head = {{"scenario", request.files.robot.string()},
+                             {"overrides", request.overrides.List()},
+                             {"from_s", options.from},
+                             {"duration_s", runs.duration()},
+                             {"scale", options.scale},
+                             {"numbers", options.parameters},
+                             {"kinds_drawn", options.kinds},
+                             {"draws", options.draws},
+                             {"together", options.together},
+                             {"draw_seed", options.seed}}};
+  campaign.Resume(request.json_file, {files.scenario.source, files.robot, files.mjcf});
+  ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet || json.TakesStdout());
+  campaign.Make(request.jobs, &bar, [&](size_t i) {
+    runs.Run(i, [] { return false; });
+    return Describe(runs.mutants()[i]);
+  });
+  bar.Finish();
+  json.Write([&] { return campaign.ToJson(); });
+  page.Write([&] { return MakeCampaignPage(campaign.ToJson()); });
+  if (json.TakesStdout()) return campaign.ToExitCode();
+  campaign.Print(request.quiet);
+  if (options.draws > 0) PrintScores(campaign, options.together);
+  return campaign.ToExitCode();
+}
+
 }  // namespace
 
 void AddMutateCommand(Command app) {
   const auto request = std::make_shared<MutateRequest>();
   Command command = app.AddCommand(
-      "mutate",
-      "Change every number and equation of the model on purpose: which faults are found and named?");
-  const std::array<Option, 2> files = AddFileOptions(
+      "mutate", "Change every number and equation of the model on purpose: which faults are found and named?",
+      {"dexcheck mutate arm.toml arm.xml", "dexcheck mutate panda-reach --draws 20 --page faults.html"});
+  AddFileOptions(
       command,
       "Scenario whose run gets the faults: numbers, equations, laws, plants; with B a parameter file",
       "The same robot for the engine; without both, the shipped pair", &request->files);
   command.AddOption("--scale X", &request->options.scale, "Change of a number, relative to it")
       .Check(NumberFrom(1e-9, 0.5))
       .ShowDefault();
-  std::vector<Option> of_runs;
-  for (const Option option : AddOverrideOptions(command, &request->run.overrides)) of_runs.push_back(option);
-  of_runs.push_back(
-      command
-          .AddOption("--from T", &request->run.options.from,
-                     "In a run: when the fault begins, s; in a motion of joints it is there from the first")
-          .Check(NumberFrom(0.0, 1e4))
-          .ShowDefault());
-  of_runs.push_back(
-      command
-          .AddOption("--duration T", &request->duration,
-                     "In a run: how long it is looked at, s (default 0.1; faults that are drawn "
-                     "in a motion of joints, or not found, are looked at to its end)")
-          .Check(NumberFrom(1e-3, 1e4)));
-  of_runs.push_back(command
-                        .AddOption("--numbers N", &request->run.options.parameters,
-                                   "In a run: how many numbers of the model are changed, evenly out of all")
-                        .Check(WholeNumber(0, 100000))
-                        .ShowDefault());
+  AddOverrideOptions(command, &request->overrides);
+  command
+      .AddOption("--from T", &request->run.from,
+                 "In a run: when the fault begins, s; in a motion of joints it is there from the first")
+      .Check(NumberFrom(0.0, 1e4))
+      .ShowDefault();
+  command
+      .AddOption("--duration T", &request->duration,
+                 "In a run: how long it is looked at, s (default 0.1; faults that are drawn "
+                 "in a motion of joints, or not found, are looked at to its end)")
+      .Check(NumberFrom(1e-3, 1e4));
+  command
+      .AddOption("--numbers N", &request->run.parameters,
+                 "In a run: how many numbers of the model are changed, evenly out of all")
+      .Check(WholeNumber(0, 100000))
+      .ShowDefault();
   const Option draws = command
-                           .AddOption("--draws N", &request->run.options.draws,
+                           .AddOption("--draws N", &request->run.draws,
                                       "In a run: sets of faults whose places, sizes and times are drawn, and "
                                       "whether they are named, in the place of the others")
                            .Check(WholeNumber(1, 100000));
-  of_runs.push_back(draws);
-  command.AddOption("--together N", &request->run.options.together, "With --draws: faults at once")
+  command.AddOption("--together N", &request->run.together, "With --draws: faults at once")
       .Check(WholeNumber(1, 5))
       .Needs(draws)
       .ShowDefault();
-  of_runs.push_back(command.AddOption("--draw-seed N", &request->run.options.seed, "In a run: what is drawn")
-                        .Check(WholeNumber(0, 1000000))
-                        .ShowDefault());
-  of_runs.push_back(
-      command
-          .AddOption(
-              "--kinds KIND,...", &request->run.options.kinds,
-              "In a run: out of which kinds of faults is drawn: motor, sensor, joint, body, floor, wheels, "
-              "contact, solver, law (default: all)")
-          .Delimiter(','));
-  std::vector<Option> of_files;
-  for (const Option option :
-       AddSampleOptions(command, 1000, &request->options.samples, &request->options.seed))
-    of_files.push_back(option);
-  of_files.push_back(command.AddFlag("--no-diagnosis", &request->no_diagnosis,
-                                     "Only whether each is found, not what is named"));
-  of_runs.push_back(
-      command.AddOption("--page FILE.html", &request->run.page_file,
-                        "In a run: an HTML page with what was made, what was found, and how it was named"));
-  AddJobsOption(command, "Faults", &request->run.jobs);
+  command.AddOption("--draw-seed N", &request->run.seed, "In a run: what is drawn")
+      .Check(WholeNumber(0, 1000000))
+      .ShowDefault();
+  command
+      .AddOption(
+          "--kinds KIND,...", &request->run.kinds,
+          "In a run: out of which kinds of faults is drawn: motor, sensor, joint, body, floor, wheels, "
+          "contact, solver, law (default: all)")
+      .Delimiter(',');
+  AddSampleOptions(command, 1000, &request->options.samples, &request->options.seed);
+  command.AddFlag("--no-diagnosis", &request->no_diagnosis, "Only whether each is found, not what is named");
+  command.AddOption("--page FILE.html", &request->page_file,
+                    "In a run: an HTML page with what was made, what was found, and how it was named");
+  AddJobsOption(command, "Faults", &request->jobs);
   AddJsonOption(command, "the results, from which an interrupted campaign goes on,", &request->json_file);
   command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
   command.SetAction([=] {
-    const bool in_run = files[0].is_given() && !files[1].is_given();
-    for (const Option& option : in_run ? of_files : of_runs) {
-      if (option.is_given())
-        throw UsageError("mutate: " + option.name() +
+    constexpr std::array kOfFiles = {"--samples", "--seed", "--no-diagnosis"};
+    constexpr std::array kOfRuns = {"--set",     "--unset", "--controller", "--from",  "--duration",
+                                    "--numbers", "--draws", "--draw-seed",  "--kinds", "--page"};
+    const bool has_first = command.is_given("--robot"), in_run = has_first && !command.is_given("--mjcf");
+    for (const char* option : in_run ? std::span<const char* const>(kOfFiles) : kOfRuns) {
+      if (command.is_given(option))
+        throw UsageError(std::string("mutate: ") + option +
                          (in_run ? " is of two files, got the scenario " : " is of a scenario's run, got ") +
-                         (in_run                ? request->files.robot.string()
-                          : files[0].is_given() ? "two files"
-                                                : "no scenario"));
+                         (in_run      ? request->files.robot.string()
+                          : has_first ? "two files"
+                                      : "no scenario"));
     }
-    return in_run ? RunInScenario(*request) : Run(*request);
+    return in_run ? MutateRun(*request) : MutateFiles(*request);
   });
 }
 

@@ -1,26 +1,89 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <system_error>
+#include <thread>
 #include <vector>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/base/console.h"
 #include "harness/base/files.h"
+#include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/make_video.h"
+#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
+#include "harness/cli/terminal.h"
 #include "harness/report/run_data.h"
 #include "renders/video.h"
 #include "renders/video_writer.h"
 
 namespace dexcheck::cli {
+namespace {
+
+/// Reads "1280x720". @throws InputError unless both are even numbers that a picture can have.
+void ReadSize(const std::string& text, int* width, int* height) {
+  const auto read = [](std::string_view part, int most) {
+    const int size = ParseNumber<int>(part).value_or(0);
+    return size >= 32 && size <= most && size % 2 == 0 ? size : 0;
+  };
+  const size_t x = std::min(text.find('x'), text.size());
+  *width = read(std::string_view(text).substr(0, x), 3840);
+  *height = read(std::string_view(text).substr(std::min(x + 1, text.size())), 2160);
+  if (*width == 0 || *height == 0)
+    throw InputError("--size: must be WIDTHxHEIGHT, even numbers from 32x32 to 3840x2160, got " +
+                     Quote(text));
+}
+
+/// Draws a run into a video, with a progress bar, on all processors, at most 8. @return false when the user
+/// stopped it; nothing is then written.
+/// @throws InputError when a camera is unknown or the file cannot be written.
+bool WriteVideo(const RunView& run, VideoOptions options, const std::string& out, bool quiet) {
+  options.workers = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8);
+  const auto start = std::chrono::steady_clock::now();
+  EncodingOptions encoding;
+  encoding.width = options.width;
+  encoding.height = options.height;
+  encoding.fps = options.fps;
+  const long frames = CountFrames(run, options.fps);
+  VideoWriter video(out, encoding);
+  CatchInterrupts();
+  ProgressBar bar("drawing", frames, quiet);
+  const bool complete = RenderVideo(run, options, &video, [&](long done, long) { return bar.GoOn(done); });
+  bar.Finish();
+  if (!complete) {
+    Warn(fmt::format("stopped after {} of {} frames; {} was not written", video.frames(), frames, out));
+    return false;
+  }
+  video.Finish();
+  if (!quiet) {
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    std::error_code ignored;
+    const double megabytes = static_cast<double>(std::filesystem::file_size(out, ignored)) / 1e6;
+    fmt::print("{}: {} frames, {:.1f} s, {} x {}, {:.1f} MB, drawn in {:.0f} s\n", out, frames,
+               static_cast<double>(frames) / options.fps, options.width, options.height, megabytes, seconds);
+  }
+  return true;
+}
+
+}  // namespace
+
+bool WriteRunVideo(const std::filesystem::path& run_folder, const std::string& out, bool quiet) {
+  const RecordedFrames run = ReadRecordedFrames(run_folder);
+  VideoOptions options;
+  options.forces = true;
+  return WriteVideo({run.model.get(), &run.frames}, options, out, quiet);
+}
+
 namespace {
 
 struct RenderRequest {
@@ -64,8 +127,7 @@ ExitCode Run(RenderRequest request) {
   if (!request.still && !WriteVideo(run, request.video, out, request.quiet)) return kFailure;
   if (request.still) WriteStill(request, run, out);
   if (!request.json_file.empty()) {
-    nlohmann::ordered_json json = {
-        {"file", out}, {"width", request.video.width}, {"height", request.video.height}};
+    Json json = {{"file", out}, {"width", request.video.width}, {"height", request.video.height}};
     if (request.still) {
       json["time_s"] = *request.still;
     } else {
@@ -82,8 +144,9 @@ ExitCode Run(RenderRequest request) {
 
 void AddRenderCommand(Command app) {
   constexpr int kMostFramesPerSecond = 120;
-  const auto request = std::make_shared<RenderRequest>();
-  Command command = app.AddCommand("render", "Draw a recorded run as a video, or one instant of it");
+  auto [command, request] = app.AddRequest<RenderRequest>(
+      "render", "Draw a recorded run as a video, or one instant of it",
+      {"dexcheck render my_run --camera follow", "dexcheck render my_run --still 2.5 --out still.png"});
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
   command.AddOption("--out FILE", &request->out,
                     "A video .mp4, or a picture .png (default: video.mp4 or still.png in RUN_DIR)");
@@ -100,7 +163,6 @@ void AddRenderCommand(Command app) {
   command.AddFlag("--no-panel", &request->no_panel, "Leave out the panel with time, errors and checks");
   command.AddFlag("--quiet", &request->quiet, "Print nothing");
   AddJsonOption(command, "what was drawn", &request->json_file);
-  command.SetAction([=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

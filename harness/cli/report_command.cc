@@ -2,10 +2,10 @@
 
 #include <filesystem>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "harness/cli/commands.h"
+#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/report/page.h"
@@ -29,11 +29,27 @@ RunScene MakeStillScene(const RunData& run, const std::filesystem::path& folder)
   return scene;
 }
 
+int Run(const ReportRequest& request) {
+  ResultFile json_file(request.json_file);
+  ResultFile tex_file(request.tex_file);
+  RequirePageName(request.out);
+  RequireKind(request.run_folder, "run's folder");
+  ReportFiles files = MakeReportFiles(request.run_folder);
+  if (!request.out.empty()) files = {request.out, {}};
+  WriteRunReport(request.run_folder, files, request.no_replay ? MakeStillScene : MakeRunScene);
+  json_file.Write([&] { return Json{{"page", files.page.string()}, {"figures", files.figures.string()}}; });
+  tex_file.Write([&] { return MakeTexTable(RunData(request.run_folder)); });
+  const bool prints = !json_file.TakesStdout() && !tex_file.TakesStdout();
+  if (!request.quiet && prints) fmt::print("{}\n", files.page.string());
+  return kSuccess;
+}
+
 }  // namespace
 
 void AddReportCommand(Command app) {
-  const auto request = std::make_shared<ReportRequest>();
-  Command command = app.AddCommand("report", "Write a recorded run's report: one page and its figures");
+  auto [command, request] =
+      app.AddRequest<ReportRequest>("report", "Write a recorded run's report: one page and its figures",
+                                    {"dexcheck report my_run", "dexcheck report my_run --tex results.tex"});
   command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
   command.AddOption("--page FILE.html", &request->out,
                     "Write only the page, here (default: report.html and figures/ in RUN_DIR)");
@@ -43,22 +59,6 @@ void AddReportCommand(Command app) {
   command.AddOption(
       "--tex FILE.tex", &request->tex_file,
       "Write a table of results for LaTeX, too, with the commit and the command (- for standard output)");
-  command.SetAction([=] {
-    ResultFile json_file(request->json_file);
-    ResultFile tex_file(request->tex_file);
-    RequirePageName(request->out);
-    RequireKind(request->run_folder, "run's folder");
-    ReportFiles files = MakeReportFiles(request->run_folder);
-    if (!request->out.empty()) files = {request->out, {}};
-    WriteRunReport(request->run_folder, files, request->no_replay ? MakeStillScene : MakeRunScene);
-    json_file.Write([&] {
-      return nlohmann::ordered_json{{"page", files.page.string()}, {"figures", files.figures.string()}};
-    });
-    tex_file.Write([&] { return MakeTexTable(RunData(request->run_folder)); });
-    const bool prints = !json_file.TakesStdout() && !tex_file.TakesStdout();
-    if (!request->quiet && prints) fmt::print("{}\n", files.page.string());
-    return kSuccess;
-  });
 }
 
 }  // namespace dexcheck::cli

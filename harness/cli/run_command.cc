@@ -14,7 +14,7 @@
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/make_video.h"
+#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
@@ -136,7 +136,7 @@ int RunScenario(const RunRequest& request) {
     result.attribution.evidence = difference;
   }
 
-  const nlohmann::ordered_json summary = MakeSummary(setup, runner.loop(), result);
+  const Json summary = MakeSummary(setup, runner.loop(), result);
   const std::string text = FormatJson(summary);
   if (recorder) recorder->Close(text);
   if (folder) OutputFile(folder->path() / "summary.json").Write(text);
@@ -231,6 +231,10 @@ int ReplayRun(const RunRequest& request) {
 }
 
 int Run(const RunRequest& request) {
+  if (request.scenario.empty() && !request.list && request.replay.empty())
+    throw UsageError("SCENARIO (or --list, or --replay) is required");
+  if (request.json_file == "-" && (request.quiet || request.all))
+    throw UsageError("--json without a file excludes --quiet and --all");
   if (request.list) {
     for (const ShippedScenario& scenario : ListShippedScenarios()) {
       const std::string line = fmt::format("{:<14} {}{}", scenario.name,
@@ -250,9 +254,10 @@ int Run(const RunRequest& request) {
 }  // namespace
 
 void AddRunCommand(Command app, const std::string& command_line) {
-  const auto request = std::make_shared<RunRequest>();
+  auto [command, request] = app.AddRequest<RunRequest>(
+      "run", "Simulate a scenario, cross-checked at every step",
+      {"dexcheck run paper --out my_run", "dexcheck run motion.toml --controller law.py"});
   request->command = command_line;
-  Command command = app.AddCommand("run", "Simulate a scenario, cross-checked at every step");
   Option scenario = command.AddOption("SCENARIO", &request->scenario,
                                       "Name of a shipped scenario (--list), or a TOML file");
   Option list = command.AddFlag("--list", &request->list, "List the shipped scenarios");
@@ -290,15 +295,6 @@ void AddRunCommand(Command app, const std::string& command_line) {
   for (Option option : {out, set, unset, seed, no_check, video, no_report, no_log, junit, all, gains, json}) {
     option.Excludes(replay).Excludes(list);
   }
-  command.SetAction([=] {
-    if (request->scenario.empty() && !request->list && request->replay.empty()) {
-      throw UsageError("SCENARIO (or --list, or --replay) is required");
-    }
-    if (request->json_file == "-" && (request->quiet || request->all)) {
-      throw UsageError("--json without a file excludes --quiet and --all");
-    }
-    return Run(*request);
-  });
 }
 
 }  // namespace dexcheck::cli

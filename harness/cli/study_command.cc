@@ -264,7 +264,9 @@ int MergeStudies(const std::string& out, const std::vector<std::string>& databas
 }  // namespace
 
 void AddStudyCommand(Command app) {
-  Command study = app.AddCommand("study", "Vary a scenario's gains, models or plant over many runs");
+  Command study =
+      app.AddCommand("study", "Vary a scenario's gains, models or plant over many runs",
+                     {"dexcheck study run gains --db gains.sqlite", "dexcheck study report gains.sqlite"});
   study.RequireCommand();
   const auto request = std::make_shared<StudyRequest>();
   const auto databases = std::make_shared<std::vector<std::string>>();
@@ -273,7 +275,9 @@ void AddStudyCommand(Command app) {
     command.AddFlag("--quiet", &request->quiet, "Print nothing but errors");
   };
 
-  Command run = study.AddCommand("run", "Make the trials that are missing in the database");
+  Command run = study.AddCommand("run", "Make the trials that are missing in the database",
+                                 {"dexcheck study run gains --db gains.sqlite",
+                                  "dexcheck study run my_study.toml --db part.sqlite --shard 1/4"});
   run.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
   run.AddOption("--db FILE.sqlite", &request->database,
                 "The study's database (SQLite), made when there is none")
@@ -285,7 +289,9 @@ void AddStudyCommand(Command app) {
   add_quiet(run);
   run.SetAction([=] { return RunStudy(*request); });
 
-  Command merge = study.AddCommand("merge", "Put the databases of one study together");
+  Command merge = study.AddCommand("merge", "Put the databases of one study together",
+                                   {"dexcheck study merge all.sqlite part1.sqlite part2.sqlite",
+                                    "dexcheck study merge all.sqlite part1.sqlite --quiet"});
   merge.AddOption("OUT", &request->database, "Database that gets all trials").Required();
   merge.AddOption("DB", databases.get(), "Databases of the same study").Required();
   add_quiet(merge);
@@ -293,7 +299,9 @@ void AddStudyCommand(Command app) {
 
   AddStudyReadCommands(study);
 
-  Command slurm = study.AddCommand("slurm", "Print an array job for Slurm that makes the study");
+  Command slurm = study.AddCommand("slurm", "Print an array job for Slurm that makes the study",
+                                   {"dexcheck study slurm gains --tasks 16",
+                                    "dexcheck study slurm my_study.toml --tasks 16 --time 01:00:00"});
   slurm.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
   const auto job = std::make_shared<SlurmJob>();
   AddControllerOptions(slurm, &request->controller);

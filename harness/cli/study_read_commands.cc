@@ -9,6 +9,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
+#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/study/study_findings.h"
 #include "harness/study/study_store.h"
@@ -16,7 +17,7 @@
 namespace dexcheck::cli {
 namespace {
 
-void WriteJson(const std::string& file, const nlohmann::ordered_json& json) {
+void WriteJson(const std::string& file, const Json& json) {
   if (!file.empty()) OutputFile(file).Write(FormatJson(json));
 }
 
@@ -53,7 +54,9 @@ void AddStudyReadCommands(Command study) {
     command.AddOption("DB", database.get(), "The study's database").Required();
   };
 
-  Command report = study.AddCommand("report", "Write an HTML page of a study's results");
+  Command report = study.AddCommand(
+      "report", "Write an HTML page of a study's results",
+      {"dexcheck study report gains.sqlite", "dexcheck study report gains.sqlite --page gains.html"});
   add_database(report);
   report.AddOption("--page FILE.html", out.get(), "The page (DB.html by default); - for standard output");
   const auto json = std::make_shared<std::string>();
@@ -67,14 +70,18 @@ void AddStudyReadCommands(Command study) {
     return kSuccess;
   });
 
-  Command show = study.AddCommand("show", "Print one trial and the command that repeats it");
+  Command show = study.AddCommand(
+      "show", "Print one trial and the command that repeats it",
+      {"dexcheck study show gains.sqlite 3", "dexcheck study show gains.sqlite 3 --json trial.json"});
   add_database(show);
   const auto number = std::make_shared<long>(0);
   show.AddOption("TRIAL", number.get(), "Number of the trial").Required();
   AddJsonOption(show, "the trial", json.get());
   show.SetAction([=] { return ShowTrial(*database, *number, *json); });
 
-  Command csv = study.AddCommand("export", "Write all trials as CSV");
+  Command csv = study.AddCommand(
+      "export", "Write all trials as CSV",
+      {"dexcheck study export gains.sqlite", "dexcheck study export gains.sqlite --out gains.csv"});
   add_database(csv);
   csv.AddOption("--out FILE.csv", out.get(), "The file (DB.csv by default); - for standard output");
   csv.SetAction([=] {
