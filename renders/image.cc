@@ -30,59 +30,31 @@ Image ReduceBottomUp(const std::uint8_t* source, int width, int height, int fact
       }
     }
     std::uint8_t* out = image.Pixel(0, y);
-    const std::uint16_t* sums = column_sums.data();
-    for (int x = 0; x < width; ++x, out += 3, sums += 3 * n) {
-      const unsigned half = area / 2;
-      unsigned r = half;
-      unsigned g = half;
-      unsigned b = half;
-      for (std::size_t k = 0; k < n; ++k) {
-        r += sums[3 * k];
-        g += sums[3 * k + 1];
-        b += sums[3 * k + 2];
+    for (std::size_t x = 0; x < static_cast<std::size_t>(width); ++x) {
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        unsigned sum = area / 2;
+        for (std::size_t k = 0; k < n; ++k) sum += column_sums[3 * (n * x + k) + channel];
+        *out++ = static_cast<std::uint8_t>(sum / area);
       }
-      out[0] = static_cast<std::uint8_t>(r / area);
-      out[1] = static_cast<std::uint8_t>(g / area);
-      out[2] = static_cast<std::uint8_t>(b / area);
     }
   }
   return image;
 }
 
-namespace {
-
-constexpr std::uint8_t kFrame[3] = {242, 245, 248};
-
-void Copy(const Image& source, int x, int y, Image* target) {
-  for (int row = 0; row < source.height; ++row) {
-    const std::uint8_t* from = source.Pixel(0, row);
-    std::copy(from, from + 3 * source.width, target->Pixel(x, y + row));
-  }
-}
-
-void Fill(int x, int y, int width, int height, Image* image) {
-  for (int row = y; row < y + height; ++row) {
-    for (int column = x; column < x + width; ++column) {
-      std::copy(std::begin(kFrame), std::end(kFrame), image->Pixel(column, row));
-    }
-  }
-}
-
-/// Pixels of a frame that is two wide at 720 rows.
-int FrameWidth(const Image& image) {
-  return std::max(1, static_cast<int>(std::lround(image.height / 360.0)));
-}
-
-}  // namespace
-
 void PlaceInset(const Image& inset, Image* image) {
-  const int frame = FrameWidth(*image);
+  constexpr std::uint8_t kFrame[3] = {242, 245, 248};
+  // A frame is two pixels wide at 720 rows.
+  const int frame = std::max(1, static_cast<int>(std::lround(image->height / 360.0)));
   const int margin = static_cast<int>(std::lround(image->height / 36.0));
   const int x = image->width - margin - frame - inset.width;
   const int y = image->height - margin - frame - inset.height;
   Require(x >= frame && y >= frame, "inset", "must fit into the picture", inset.width);
-  Fill(x - frame, y - frame, inset.width + 2 * frame, inset.height + 2 * frame, image);
-  Copy(inset, x, y, image);
+  for (int row = -frame; row < inset.height + frame; ++row) {
+    for (int column = -frame; column < inset.width + frame; ++column)
+      std::ranges::copy(kFrame, image->Pixel(x + column, y + row));
+    if (row < 0 || row >= inset.height) continue;
+    std::copy_n(inset.Pixel(0, row), 3 * inset.width, image->Pixel(x, y + row));
+  }
 }
 
 }  // namespace dexcheck

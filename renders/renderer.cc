@@ -16,7 +16,8 @@ namespace {
 
 constexpr int kConeSides = 48;
 
-/// Seen from both sides.
+/// Makes the shell of a cone about z that opens from the origin, of height 1 and radius 1 at its end, seen
+/// from both sides, which MuJoCo's scenes lack. @returns an OpenGL display list of the current context.
 unsigned MakeCone() {
   const unsigned list = LoadMesa().glGenLists(1);
   if (list == 0) throw Error("OpenGL: cannot make a display list");
@@ -41,15 +42,6 @@ unsigned MakeCone() {
   LoadMesa().glEndList();
   return list;
 }
-
-}  // namespace
-
-DisplayCone::DisplayCone(const mjrContext& context)
-    : list_(MakeCone()), mesh_(static_cast<int>(list_) - static_cast<int>(context.baseMesh)) {}
-
-DisplayCone::~DisplayCone() { LoadMesa().glDeleteLists(list_, 1); }
-
-namespace {
 
 constexpr int kLargestWidth = 3840;
 constexpr int kLargestHeight = 2160;
@@ -104,6 +96,62 @@ mjvCamera MakeFreeCamera(const Viewpoint& from) {
   return view;
 }
 
+constexpr float kGlow = 0.35F;  // emission, so that colours stay recognisable in shadow
+
+/// Adds decorations to a scene.
+class GeomAdder {
+ public:
+  /// @param cone number of the mesh that is a cone: mjr_render draws a mesh by calling the display list of
+  /// its number, counted from the first mesh.
+  GeomAdder(int cone, mjvScene* scene) : cone_(cone), scene_(*scene) {}
+
+  void operator()(const Arrow& arrow) {
+    const Vector3d along = arrow.to - arrow.from;
+    if (along.norm() <= arrow.radius) return;
+    mjvGeom& geom = Add(mjGEOM_ARROW, arrow.color);
+    // The engine draws arrows half as long as their given length.
+    const Vector3d end = arrow.from + 2.0 * along;
+    MakeConnector(mjGEOM_ARROW, arrow.radius, arrow.from.data(), end.data(), &geom);
+  }
+
+  void operator()(const Cone& cone) {
+    mjvGeom& geom = Add(mjGEOM_MESH, cone.color);
+    geom.dataid = cone_;
+    const Vector3d x = cone.axis.unitOrthogonal();
+    const Vector3d y = cone.axis.cross(x);
+    const double radius = cone.height * std::tan(cone.half_angle);
+    Matrix3d scaled;
+    scaled << radius * x, radius * y, cone.height * cone.axis;
+    Place(cone.apex, scaled, &geom);
+  }
+
+ private:
+  mjvGeom& Add(int type, const Color& color) {
+    Require(scene_.ngeom < scene_.maxgeom, "decorations", "must fit into the scene's number of geoms",
+            scene_.maxgeom);
+    mjvGeom& geom = scene_.geoms[scene_.ngeom++];
+    // mjv_initGeom leaves some members, such as what transparent geoms are sorted by, as they were.
+    geom = mjvGeom{};
+    mjv_initGeom(&geom, type, nullptr, nullptr, nullptr, color.data());
+    geom.category = mjCAT_DECOR;
+    geom.emission = kGlow;
+    geom.specular = 0.3F;
+    geom.shininess = 0.4F;
+    return geom;
+  }
+
+  /// @param scaled rotation whose columns carry the shape's sizes.
+  static void Place(const Vector3d& p, const Matrix3d& scaled, mjvGeom* geom) {
+    for (int i = 0; i < 3; ++i) {
+      geom->pos[i] = static_cast<float>(p[i]);
+      for (int j = 0; j < 3; ++j) geom->mat[3 * i + j] = static_cast<float>(scaled(i, j));
+    }
+  }
+
+  int cone_;
+  mjvScene& scene_;
+};
+
 }  // namespace
 
 std::vector<std::string> ListCameras(const mjModel& model) {
@@ -138,7 +186,7 @@ Renderer::Renderer(const mjModel& model, const RenderOptions& options)
   sized->vis.quality.numstacks = kStacks;
   mjr_makeContext(sized.get(), &context_, mjFONTSCALE_100);
   mjr_setBuffer(mjFB_OFFSCREEN, &context_);
-  cone_.emplace(context_);
+  cone_ = MakeCone();
   scene_.flags[mjRND_SHADOW] = 1;
   scene_.flags[mjRND_REFLECTION] = 0;
   pixels_.resize(3 * static_cast<size_t>(options.samples * options.width) *
@@ -147,17 +195,13 @@ Renderer::Renderer(const mjModel& model, const RenderOptions& options)
 
 Renderer::~Renderer() {
   gl_->MakeCurrent();
-  cone_.reset();
+  LoadMesa().glDeleteLists(cone_, 1);
   mjr_freeContext(&context_);
   mjv_freeScene(&scene_);
 }
 
 Image Renderer::Render(mjData& data, std::span<const Decoration> decorations) {
   return Draw(data, MakeCamera(camera_), options_.width, options_.height, options_.shift_right, decorations);
-}
-
-Image Renderer::Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations) {
-  return Render(data, from, options_.width, options_.height, decorations);
 }
 
 Image Renderer::Render(mjData& data, const Viewpoint& from, int width, int height,
@@ -183,7 +227,8 @@ Image Renderer::Draw(mjData& data, mjvCamera view, int width, int height, double
     eye.frustum_center -= static_cast<float>(shift_right * visible);
   }
   FadeBody();
-  AddDecorations(decorations, *cone_, &scene_);
+  GeomAdder adder(static_cast<int>(cone_) - static_cast<int>(context_.baseMesh), &scene_);
+  for (const Decoration& decoration : decorations) std::visit(adder, decoration);
   const mjrRect viewport = {0, 0, options_.samples * width, options_.samples * height};
   mjr_render(viewport, &scene_, &context_);
   mjr_readPixels(pixels_.data(), nullptr, viewport, &context_);
@@ -207,68 +252,6 @@ void Renderer::FadeBody() {
     if (geom.objtype != mjOBJ_GEOM || model_.geom_bodyid[geom.objid] != translucent_body_) continue;
     geom.rgba[3] = std::min(geom.rgba[3], kOpacity);
   }
-}
-
-namespace {
-
-constexpr float kGlow = 0.35F;  // emission, so that colours stay recognisable in shadow
-
-class GeomAdder {
- public:
-  GeomAdder(const DisplayCone& cone, mjvScene* scene) : cone_(cone), scene_(*scene) {}
-
-  void operator()(const Arrow& arrow) {
-    const Vector3d along = arrow.to - arrow.from;
-    if (along.norm() <= arrow.radius) return;
-    mjvGeom& geom = Add(mjGEOM_ARROW, arrow.color);
-    // The engine draws arrows half as long as their given length.
-    const Vector3d end = arrow.from + 2.0 * along;
-    MakeConnector(mjGEOM_ARROW, arrow.radius, arrow.from.data(), end.data(), &geom);
-  }
-
-  void operator()(const Cone& cone) {
-    mjvGeom& geom = Add(mjGEOM_MESH, cone.color);
-    geom.dataid = cone_.mesh();
-    const Vector3d x = cone.axis.unitOrthogonal();
-    const Vector3d y = cone.axis.cross(x);
-    const double radius = cone.height * std::tan(cone.half_angle);
-    Matrix3d scaled;
-    scaled << radius * x, radius * y, cone.height * cone.axis;
-    Place(cone.apex, scaled, &geom);
-  }
-
- private:
-  mjvGeom& Add(int type, const Color& color) {
-    Require(scene_.ngeom < scene_.maxgeom, "decorations", "must fit into the scene's number of geoms",
-            scene_.maxgeom);
-    mjvGeom& geom = scene_.geoms[scene_.ngeom++];
-    // mjv_initGeom leaves some members, such as what transparent geoms are sorted by, as they were.
-    geom = mjvGeom{};
-    mjv_initGeom(&geom, type, nullptr, nullptr, nullptr, color.data());
-    geom.category = mjCAT_DECOR;
-    geom.emission = kGlow;
-    geom.specular = 0.3F;
-    geom.shininess = 0.4F;
-    return geom;
-  }
-
-  /// @param scaled rotation whose columns carry the shape's sizes.
-  static void Place(const Vector3d& p, const Matrix3d& scaled, mjvGeom* geom) {
-    for (int i = 0; i < 3; ++i) {
-      geom->pos[i] = static_cast<float>(p[i]);
-      for (int j = 0; j < 3; ++j) geom->mat[3 * i + j] = static_cast<float>(scaled(i, j));
-    }
-  }
-
-  const DisplayCone& cone_;
-  mjvScene& scene_;
-};
-
-}  // namespace
-
-void AddDecorations(std::span<const Decoration> decorations, const DisplayCone& cone, mjvScene* scene) {
-  GeomAdder adder(cone, scene);
-  for (const Decoration& decoration : decorations) std::visit(adder, decoration);
 }
 
 }  // namespace dexcheck

@@ -16,23 +16,6 @@
 
 namespace dexcheck {
 
-/// The shell of a cone about z that opens from the origin, of height 1 and radius 1 at its end, which
-/// MuJoCo's scenes lack, as an OpenGL display list. mjr_render draws a mesh by calling the list of its
-/// number, counted from the first mesh, so that the cone is a geom of type mjGEOM_MESH with this number as
-/// its dataid. The context must be current when it is made and destroyed.
-class DisplayCone {
- public:
-  explicit DisplayCone(const mjrContext& context);
-  ~DisplayCone();
-  DisplayCone(const DisplayCone&) = delete;
-  DisplayCone& operator=(const DisplayCone&) = delete;
-  [[nodiscard]] int mesh() const { return mesh_; }
-
- private:
-  unsigned list_;
-  int mesh_;
-};
-
 /// A camera that stands still where RenderOptions::course says; an MJCF's camera of this name comes first.
 inline constexpr const char* kCourseCamera = "course";
 
@@ -73,9 +56,7 @@ class Renderer {
   /// Draws the state in `data`, whose kinematics, cameras and lights must be computed.
   Image Render(mjData& data, std::span<const Decoration> decorations = {});
 
-  /// Draws from a camera at the given viewpoint.
-  Image Render(mjData& data, const Viewpoint& from, std::span<const Decoration> decorations = {});
-  /// Draws a picture at most as large as the options' one.
+  /// Draws from a camera at the given viewpoint a picture at most as large as the options' one.
   Image Render(mjData& data, const Viewpoint& from, int width, int height,
                std::span<const Decoration> decorations);
 
@@ -98,13 +79,8 @@ class Renderer {
   mjvPerturb perturb_;
   mjvScene scene_;
   mjrContext context_;
-  std::optional<DisplayCone> cone_;
+  unsigned cone_ = 0;  // display list
   std::vector<std::uint8_t> pixels_;
 };
-
-/// Adds decorations to a scene.
-/// @param cone which must outlive the drawing of the scene.
-/// @throws std::invalid_argument when the scene has no room for them.
-void AddDecorations(std::span<const Decoration> decorations, const DisplayCone& cone, mjvScene* scene);
 
 }  // namespace dexcheck

@@ -80,7 +80,8 @@ class VideoPainter::RunPainter {
     std::vector<Decoration> decorations;
     if (options_.forces) decorations = MakeForces(run_, row, meters_per_newton_);
     const std::optional<Viewpoint> view = FindOwnView(camera_, MakeEdges());
-    Image image = view ? renderer_.Render(*data_, *view, decorations) : renderer_.Render(*data_, decorations);
+    Image image = view ? renderer_.Render(*data_, *view, options_.width, options_.height, decorations)
+                       : renderer_.Render(*data_, decorations);
     if (!options_.inset.empty()) PlaceInset(PaintInset(decorations), &image);
     if (overlay_) overlay_->Draw(MakeState(row), &image);
     return image;
