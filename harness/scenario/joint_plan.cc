@@ -124,18 +124,6 @@ VectorXd VaryPosture(const RobotModel& model, std::uint64_t seed, VectorXd q) {
   return q;
 }
 
-JointMotion MakeBodyMotion(const StanceTask& task) {
-  std::vector<JointWayPoint> points;
-  for (const StanceTask::Point& point : task.points) {
-    JointWayPoint& to = points.emplace_back(JointWayPoint{point.time, VectorXd::Zero(6)});
-    to.q << point.xyz, point.angles;
-  }
-  std::vector<JointOscillation> oscillations;
-  for (const StanceTask::Oscillation& one : task.oscillations)
-    oscillations.push_back({one.axis, one.amplitude, one.frequency, one.ramp_time, one.end_time});
-  return JointMotion(VectorXd::Zero(6), points, oscillations);
-}
-
 /// A robot that stands: level, on all feet, its joints in the posture that is asked for as far as the ground
 /// lets them. @param q_joints rad or m.
 JointPlan MakeStancePlan(const Scenario& scenario, const RobotModel& model, const JointReader& joints,
@@ -159,7 +147,8 @@ JointPlan MakeStancePlan(const Scenario& scenario, const RobotModel& model, cons
   }
   joints.RequireInRange("joint_motion.start_deg", q.tail(q_joints.size()));
   JointPlan plan{
-      JointMotion(std::make_shared<const StanceMotion>(model, stance, q, MakeBodyMotion(*task.stance))),
+      JointMotion(std::make_shared<const StanceMotion>(
+          model, stance, q, JointMotion(VectorXd::Zero(6), task.stance->points, task.stance->oscillations))),
       FindGains(task, joints, model, q)};
   plan.gains.stance = stance;
   PlaceObject(Pose::Identity(), start);
@@ -190,8 +179,7 @@ JointPlan MakeJointPlan(const Scenario& scenario, const RobotPair& robots, Start
   }
   std::vector<JointOscillation> oscillations;
   for (const JointTask::Oscillation& one : task.oscillations) {
-    oscillations.push_back({joints.Find(one.key + ".joint", one.joint, one.in_degrees), one.amplitude,
-                            one.frequency, one.ramp_time, one.end_time});
+    oscillations.emplace_back(one).joint = joints.Find(one.key + ".joint", one.name, one.in_degrees);
   }
   Pose X_Bo = Pose::Identity();
   if (model.object()) {

@@ -24,10 +24,9 @@ std::string ReadPath(TomlTable& table, std::string_view key, const std::filesyst
 void ReadModel(const TomlValue& value, const std::filesystem::path& folder, Scenario* scenario) {
   TomlTable table = value.AsTable();
   scenario->model_file = ReadPath(table, "file", folder);
-  if (const auto list = table.Find("overrides")) {
-    for (const TomlValue& entry : list->AsList()) scenario->model_overrides.push_back(entry.AsText());
-    scenario->own_model_overrides = scenario->model_overrides.size();
-  }
+  for (const TomlValue& entry : ListEntries(table, "overrides"))
+    scenario->model_overrides.push_back(entry.AsText());
+  scenario->own_model_overrides = scenario->model_overrides.size();
   table.RejectUnused();
 }
 
@@ -69,12 +68,10 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
   if (const auto count = table.Find("noslip_iterations")) {
     plant.noslip_iterations = static_cast<int>(count->AsWhole(0, kMaxNoslipIterations));
   }
-  if (const auto pairs = table.Find("allowed_collision_pairs")) {
-    for (const TomlValue& entry : pairs->AsList()) {
-      const std::vector<TomlValue> bodies = entry.AsList();
-      if (bodies.size() != 2) entry.Reject("must name two bodies");
-      plant.allowed_collision_pairs.emplace_back(bodies[0].AsPartName(), bodies[1].AsPartName());
-    }
+  for (const TomlValue& entry : ListEntries(table, "allowed_collision_pairs")) {
+    const std::vector<TomlValue> bodies = entry.AsList();
+    if (bodies.size() != 2) entry.Reject("must name two bodies");
+    plant.allowed_collision_pairs.emplace_back(bodies[0].AsPartName(), bodies[1].AsPartName());
   }
   table.RejectUnused();
 }

@@ -18,6 +18,7 @@
 #include "controller/contact/surface.h"
 #include "controller/control/baseline_law.h"
 #include "controller/control/computed_torque.h"
+#include "controller/control/joint_motion.h"
 #include "controller/control/object_tracking.h"
 #include "controller/control/trajectory.h"
 #include "controller/handling/pick_and_place.h"
@@ -131,24 +132,13 @@ struct JointNumbers {
 
 /// The feet on which a robot with a floating base stands, and how its body moves there.
 struct StanceTask {
-  struct Point {
-    double time = 0.0;                   ///< s.
-    Vector3d xyz = Vector3d::Zero();     ///< Displacement of the base since the start, m.
-    Vector3d angles = Vector3d::Zero();  ///< Roll, pitch, yaw since the start, rad.
-  };
-  struct Oscillation {
-    int axis = 0;            ///< x, y, z, roll, pitch, yaw.
-    double amplitude = 0.0;  ///< m or rad.
-    double frequency = 0.0;  ///< 1/s.
-    double ramp_time = 0.0;  ///< s.
-    double end_time = 0.0;   ///< s; 0 for never.
-  };
   std::vector<std::string> feet;  ///< Frames.
   double mu = 0.0;                ///< Friction that the law counts on.
   double f_min = 0.0;             ///< Least normal force of a foot, N.
   double f_max = 0.0;             ///< Largest, N.
-  std::vector<Point> points;
-  std::vector<Oscillation> oscillations;
+  // By axis: displacement of the base since the start, x, y, z, m, and its roll, pitch, yaw, rad.
+  std::vector<JointWayPoint> points;
+  std::vector<JointOscillation> oscillations;
 };
 
 /// The joints of a robot that holds nothing follow a motion of their own, or that of its body.
@@ -157,13 +147,9 @@ struct JointTask {
     double time = 0.0;   ///< s.
     JointNumbers where;  ///< Joints that it does not name stay where the point before has them.
   };
-  struct Oscillation {
-    std::string joint;
-    double amplitude = 0.0;  ///< rad or m.
+  struct Oscillation : JointOscillation {
+    std::string name;  ///< Of the joint.
     bool in_degrees = false;
-    double frequency = 0.0;  ///< 1/s.
-    double ramp_time = 0.0;  ///< s.
-    double end_time = 0.0;   ///< s; 0 for never.
     std::string key;
   };
   JointNumbers start;  ///< Others begin at 0.

@@ -173,12 +173,10 @@ Imperfections ReadImperfections(TomlTable& root, double time_step) {
     ReadActuation(*actuation, time_step, &all.actuation);
     ListKeys(*actuation, &all.declared);
   }
-  if (const auto disturbances = root.Find("disturbance")) {
-    size_t number = 0;
-    for (const TomlValue& entry : disturbances->AsList()) {
-      ReadDisturbance(entry, number++, time_step, &all);
-      all.declared.push_back(entry.path() + " = " + entry.Show());
-    }
+  size_t number = 0;
+  for (const TomlValue& entry : ListEntries(root, "disturbance")) {
+    ReadDisturbance(entry, number++, time_step, &all);
+    all.declared.push_back(entry.path() + " = " + entry.Show());
   }
   if (const auto mismatch = root.Find("mismatch")) {
     ReadMismatch(*mismatch, &all.mismatch);

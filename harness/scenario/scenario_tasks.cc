@@ -212,20 +212,16 @@ JointNumbers ReadJointNumbers(TomlTable& table, const std::string& key) {
   return numbers;
 }
 
-JointTask::Point ReadPoint(const TomlValue& value, double time_before) {
-  TomlTable table = value.AsTable();
+/// When a way point is reached, after the one before.
+double ReadTime(TomlTable& table, double time_before) {
   const TomlValue time = table.Get("time");
-  JointTask::Point point{time.AsPositive(), ReadJointNumbers(table, "joints")};
-  if (point.time <= time_before) time.Fail("must be greater than the time before");
-  if (point.where.key.empty()) table.Miss("joints_deg");
-  table.RejectUnused();
-  return point;
+  if (time.AsPositive() <= time_before) time.Fail("must be greater than the time before");
+  return time.AsPositive();
 }
 
 /// Amplitude, frequency and ramp. @param missing the amplitude's key, where it has none.
 /// @return the amplitude's unit: 1, or that of degrees.
-template <typename Oscillation>
-double ReadSine(const char* missing, TomlTable* table, Oscillation* one) {
+double ReadSine(const char* missing, TomlTable* table, JointOscillation* one) {
   auto [amplitude, unit] = table->FindWithAngleUnit("amplitude");
   if (!amplitude) amplitude = table->Miss(missing);
   one->amplitude = unit * amplitude->AsNumber();
@@ -247,7 +243,7 @@ double ReadSine(const char* missing, TomlTable* table, Oscillation* one) {
 JointTask::Oscillation ReadOscillation(const TomlValue& value) {
   TomlTable table = value.AsTable();
   JointTask::Oscillation one;
-  one.joint = table.Get("joint").AsPartName();
+  one.name = table.Get("joint").AsPartName();
   one.key = value.path();
   one.in_degrees = ReadSine("amplitude_deg", &table, &one) != 1.0;
   return one;
@@ -257,26 +253,27 @@ JointTask ReadJointMotion(const TomlValue& value) {
   TomlTable table = value.AsTable();
   JointTask task;
   task.start = ReadJointNumbers(table, "start");
-  if (const auto points = table.Find("points")) {
-    for (const TomlValue& entry : points->AsList()) {
-      task.points.push_back(ReadPoint(entry, task.points.empty() ? 0.0 : task.points.back().time));
-    }
+  for (const TomlValue& entry : ListEntries(table, "points")) {
+    TomlTable point = entry.AsTable();
+    const double time = ReadTime(point, task.points.empty() ? 0.0 : task.points.back().time);
+    task.points.push_back({time, ReadJointNumbers(point, "joints")});
+    if (task.points.back().where.key.empty()) point.Miss("joints_deg");
+    point.RejectUnused();
   }
-  if (const auto oscillations = table.Find("oscillations")) {
-    for (const TomlValue& entry : oscillations->AsList()) task.oscillations.push_back(ReadOscillation(entry));
-  }
+  for (const TomlValue& entry : ListEntries(table, "oscillations"))
+    task.oscillations.push_back(ReadOscillation(entry));
   table.RejectUnused();
   return task;
 }
 
 constexpr std::string_view kAxes[] = {"x", "y", "z", "roll", "pitch", "yaw"};
 
-StanceTask::Oscillation ReadStanceOscillation(const TomlValue& value) {
+JointOscillation ReadStanceOscillation(const TomlValue& value) {
   TomlTable table = value.AsTable();
-  StanceTask::Oscillation one;
-  one.axis = table.Get("axis").AsChoice<int>(
+  JointOscillation one;
+  one.joint = table.Get("axis").AsChoice<int>(
       {{kAxes[0], 0}, {kAxes[1], 1}, {kAxes[2], 2}, {kAxes[3], 3}, {kAxes[4], 4}, {kAxes[5], 5}});
-  const bool turns = one.axis >= 3;
+  const bool turns = one.joint >= 3;
   if (const auto angle = table.Find("amplitude_deg"); angle && !turns)
     angle->Fail("must be in m, under the key without _deg");
   ReadSine(turns ? "amplitude_deg" : "amplitude", &table, &one);
@@ -294,23 +291,16 @@ StanceTask ReadStance(const TomlValue& value) {
   (void)table.Get("f_max");
   ReadKeys<Options>(table, {POSITIVE_KEY(mu), KEY(f_min), POSITIVE_KEY(f_max)}, &task);
   if (task.f_max <= task.f_min) table.Get("f_max").Fail("must be greater than f_min");
-  if (const auto points = table.Find("points")) {
-    for (const TomlValue& entry : points->AsList()) {
-      TomlTable point = entry.AsTable();
-      const double before = task.points.empty() ? 0.0 : task.points.back().time;
-      StanceTask::Point& to = task.points.emplace_back();
-      const TomlValue time = point.Get("time");
-      to.time = time.AsPositive();
-      if (to.time <= before) time.Fail("must be greater than the time before");
-      if (const auto xyz = point.Find("xyz")) to.xyz = xyz->AsVector<3>();
-      if (const auto angles = point.FindAngles<3>("rpy")) to.angles = *angles;
-      point.RejectUnused();
-    }
+  for (const TomlValue& entry : ListEntries(table, "points")) {
+    TomlTable point = entry.AsTable();
+    const double time = ReadTime(point, task.points.empty() ? 0.0 : task.points.back().time);
+    VectorXd& to = task.points.emplace_back(JointWayPoint{time, VectorXd::Zero(6)}).q;
+    if (const auto xyz = point.Find("xyz")) to.head<3>() = xyz->AsVector<3>();
+    if (const auto angles = point.FindAngles<3>("rpy")) to.tail<3>() = *angles;
+    point.RejectUnused();
   }
-  if (const auto oscillations = table.Find("oscillations")) {
-    for (const TomlValue& entry : oscillations->AsList())
-      task.oscillations.push_back(ReadStanceOscillation(entry));
-  }
+  for (const TomlValue& entry : ListEntries(table, "oscillations"))
+    task.oscillations.push_back(ReadStanceOscillation(entry));
   table.RejectUnused();
   return task;
 }

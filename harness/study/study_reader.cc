@@ -6,6 +6,7 @@
 
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
+#include "harness/scenario/scenario_reader.h"
 #include "harness/study/sampling.h"
 #include "harness/study/study.h"
 
@@ -106,10 +107,10 @@ Sample ReadSample(const TomlValue& value) {
   return sample;
 }
 
-void ReadMetrics(const TomlValue& value, Study* study) {
+void ReadMetrics(TomlTable& root, Study* study) {
   std::vector<std::string> known;
   for (const MetricInfo& metric : kMetrics) known.emplace_back(metric.name);
-  for (const TomlValue& entry : value.AsList()) {
+  for (const TomlValue& entry : ListEntries(root, "metrics")) {
     const std::string name = entry.AsName();
     if (!FindMetric(name)) entry.Reject("no metric is called " + Quote(name) + SuggestNearest(name, known));
     study->metrics.push_back(name);
@@ -235,11 +236,9 @@ Study ReadStudy(TomlTable& root, Study study) {
   if (const auto description = root.Find("description")) study.description = description->AsText();
   study.scenario = root.Get("scenario").AsText();
   if (const auto controller = root.Find("controller")) study.controller = controller->AsText();
-  if (const auto list = root.Find("set")) {
-    for (const TomlValue& entry : list->AsList()) {
-      study.overrides.push_back(entry.AsText());
-      if (study.overrides.back().find('=') == std::string::npos) entry.Fail("must be KEY=VALUE");
-    }
+  for (const TomlValue& entry : ListEntries(root, "set")) {
+    study.overrides.push_back(entry.AsText());
+    if (study.overrides.back().find('=') == std::string::npos) entry.Fail("must be KEY=VALUE");
   }
   if (const auto list = root.Find("seeds")) {
     study.seeds.clear();
@@ -251,7 +250,7 @@ Study ReadStudy(TomlTable& root, Study study) {
   if (const auto check = root.Find("check")) study.check = check->AsFlag();
   if (const auto limit = root.Find("trial_time_limit")) study.trial_time_limit = limit->AsPositive();
   if (const auto error = root.Find("stop_error")) study.stop_error = error->AsPositive();
-  if (const auto metrics = root.Find("metrics")) ReadMetrics(*metrics, &study);
+  ReadMetrics(root, &study);
   root.RejectTogether("search", {"sample"});
   const auto search = root.Find("search");
   if (const auto sample = root.Find("sample")) study.sample = ReadSample(*sample);
@@ -260,12 +259,10 @@ Study ReadStudy(TomlTable& root, Study study) {
   if (study.variations.empty()) vary.Reject("needs at least one key");
   if (study.sample.method == SamplingMethod::kSobol && study.variations.size() > kMaxSobolDimensions)
     vary.Reject("a Sobol sequence varies at most " + std::to_string(kMaxSobolDimensions) + " keys");
-  if (const auto list = root.Find("objective")) {
-    for (const TomlValue& entry : list->AsList()) study.objectives.push_back(ReadObjective(entry));
-  }
-  if (const auto list = root.Find("constraints")) {
-    for (const TomlValue& entry : list->AsList()) study.constraints.push_back(ReadConstraint(entry));
-  }
+  for (const TomlValue& entry : ListEntries(root, "objective"))
+    study.objectives.push_back(ReadObjective(entry));
+  for (const TomlValue& entry : ListEntries(root, "constraints"))
+    study.constraints.push_back(ReadConstraint(entry));
   if (search) ReadSearch(*search, &study);
   RequireFewTrials(vary, study);
   return study;
