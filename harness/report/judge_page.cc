@@ -1,7 +1,5 @@
 #include "harness/report/judge_page.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <limits>
 #include <memory>
@@ -9,8 +7,11 @@
 #include <vector>
 
 #include "harness/base/files.h"
+#include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/read_description.h"
+#include "harness/engine/mjcf_passes.h"
 #include "harness/engine/visible_model.h"
+#include "harness/engine/xml.h"
 #include "harness/report/page_frame.h"
 
 namespace dexcheck {
@@ -19,44 +20,24 @@ namespace {
 
 constexpr const char* kFloor = "recorded floor";
 
-std::string ToText(const Pose& X) {
-  const Vector3d p = X.translation();
-  const Eigen::Quaterniond q(X.linear());
-  return fmt::format("pos=\"{:.9g} {:.9g} {:.9g}\" quat=\"{:.9g} {:.9g} {:.9g} {:.9g}\"", p.x(), p.y(), p.z(),
-                     q.w(), q.x(), q.y(), q.z());
+/// An MJCF of a model's joints, its links without shapes, over a floor. Joint i is called "i".
+std::unique_ptr<MjcfFile> MakeSkeleton(const RobotModel& model, const std::string& source) {
+  RobotDescription robot;
+  robot.spec = model.spec();
+  robot.spec.base.link = "base";
+  for (Joint& joint : robot.spec.joints) {
+    joint.name = joint.link = std::to_string(robot.joints.size());
+    joint.body = {1.0, joint.body.com, Matrix3d::Identity()};
+    robot.joints.emplace_back().states_range = false;
+  }
+  std::vector<Frame>& frames = robot.spec.frames;
+  for (Frame& frame : frames) frame.name = std::to_string(&frame - frames.data());
+  auto mjcf = std::make_unique<MjcfFile>(WriteMjcf(robot, "a model"), source);
+  SetAttributes(
+      {{"name", kFloor}, {"type", "plane"}, {"size", "3 3 1"}, {"contype", "0"}, {"conaffinity", "0"}},
+      RequireSection(mjcf->root(), "worldbody")->InsertNewChildElement("geom"));
+  return mjcf;
 }
-
-/// An MJCF of a model's joints, its links without shapes. Joint i is called "i".
-class SkeletonText {
- public:
-  explicit SkeletonText(const RobotModel& model) : model_(model) {}
-
-  std::string Make() const {
-    return "<mujoco><compiler angle=\"radian\"/><worldbody><geom name=\"" + std::string(kFloor) +
-           "\" type=\"plane\" size=\"3 3 1\" contype=\"0\" conaffinity=\"0\"/><body " +
-           ToText(model_.base().X_B0) + ">" + Children(-1) + "</body></worldbody></mujoco>";
-  }
-
- private:
-  [[nodiscard]] std::string Children(int parent) const {
-    std::string text;
-    for (const Frame& frame : model_.frames())
-      if (frame.link == parent) text += "<site " + ToText(frame.X_LF) + "/>";
-    for (int i = 0; i < model_.num_joints(); ++i) {
-      const Joint& joint = model_.joint(i);
-      if (joint.parent != parent) continue;
-      const Vector3d com = joint.body.com;
-      text += fmt::format(
-          "<body {}><joint name=\"{}\" type=\"{}\" axis=\"0 0 1\"/><inertial pos=\"{:.9g} {:.9g} {:.9g}\" "
-          "mass=\"1\" diaginertia=\"1 1 1\"/>{}</body>",
-          ToText(CalcRowPose(joint)), i, joint.type == JointType::kPrismatic ? "slide" : "hinge", com.x(),
-          com.y(), com.z(), Children(i));
-    }
-    return text;
-  }
-
-  const RobotModel& model_;
-};
 
 /// Below all that moves, at most at 0.
 void PlaceFloor(const RunFrames& frames, mjModel* scene) {
@@ -91,8 +72,7 @@ std::optional<ReplayData> MakeMotionReplay(const RobotModel& model, const std::f
                                     [](const Joint& joint) { return joint.type == JointType::kBall; });
   if (has_ball || model.base().type != BaseType::kFixed) return std::nullopt;
   const bool is_mjcf = FindFormat(ReadBytes(file), file) == RobotFormat::kMjcf;
-  const auto mjcf = is_mjcf ? std::make_unique<MjcfFile>(file)
-                            : std::make_unique<MjcfFile>(SkeletonText(model).Make(), file.string());
+  const auto mjcf = is_mjcf ? std::make_unique<MjcfFile>(file) : MakeSkeleton(model, file.string());
   const MjModelPtr scene = LoadVisible(mjcf.get());
   RunFrames frames;
   frames.source = file.string();

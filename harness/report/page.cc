@@ -233,6 +233,14 @@ void AddVideo(const fs::path& run_dir, const fs::path& page, PageContent* conten
 
 }  // namespace
 
+std::string MakeCampaignPage(const nlohmann::ordered_json& campaign) {
+  return AssemblePage({.title = "faults made on purpose",
+                       .styles = {},
+                       .markup = {kPageHtml},
+                       .data = EmbedJson("campaign-data", campaign),
+                       .scripts = {kCampaignJs}});
+}
+
 ReportFiles MakeReportFiles(const fs::path& run_dir) {
   return {run_dir / "report.html", run_dir / "figures"};
 }
