@@ -110,17 +110,17 @@ int Run(const AuditRequest& request) {
 
 }  // namespace
 
-void AddAuditCommand(Command app) {
-  auto [command, request] = app.AddRequest<AuditRequest>(
-      "audit", "Look for what cannot be, or is suspicious, in one description of a robot",
+void AddAuditCommand(CLI::App* app) {
+  const auto [command, request] = AddRequest<AuditRequest>(
+      app, "audit", "Look for what cannot be, or is suspicious, in one description of a robot",
       {"dexcheck audit arm.urdf", "dexcheck audit arm.xml --junit audit.xml"});
-  command.AddOption("FILE", &request->robot, "Parameter file (TOML), URDF or MJCF")
-      .TypeName("FILE")
-      .Required();
+  AddOption(command, "FILE", &request->robot, "Parameter file (TOML), URDF or MJCF")
+      ->type_name("FILE")
+      ->required();
   AddUrdfOptions(command, &request->urdf);
   AddJsonOption(command, "the findings", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
-  command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  command->add_flag("--quiet", request->quiet, "Print the verdict only");
 }
 
 }  // namespace dexcheck::cli

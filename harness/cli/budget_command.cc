@@ -82,17 +82,19 @@ int Run(const BudgetRequest& request) {
 
 }  // namespace
 
-void AddBudgetCommand(Command app) {
-  auto [command, request] = app.AddRequest<BudgetRequest>(
-      "budget", "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all",
+void AddBudgetCommand(CLI::App* app) {
+  const auto [command, request] = AddRequest<BudgetRequest>(
+      app, "budget",
+      "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all",
       {"dexcheck budget curve-real", "dexcheck budget motion.toml --set duration=2"});
-  command.AddOption("SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file").Required();
+  AddOption(command, "SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file")
+      ->required();
   AddOverrideOptions(command, &request->overrides);
   AddSeedOption(command, &request->seed, "Seed of all that is random");
-  command.AddOption("--page FILE.html", &request->page, "Write table and bar chart as a page");
+  AddOption(command, "--page FILE.html", &request->page, "Write table and bar chart as a page");
   AddJobsOption(command, "Runs", &request->jobs);
   AddJsonOption(command, "the budget", &request->json_file);
-  command.AddFlag("--quiet", &request->quiet, "Print the last line only");
+  command->add_flag("--quiet", request->quiet, "Print the last line only");
 }
 
 }  // namespace dexcheck::cli

@@ -1,10 +1,11 @@
 #include "harness/cli/command_line.h"
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <sstream>
+#include <string_view>
+#include <vector>
 
 #include "controller/common/text.h"
 #include "harness/base/console.h"
@@ -46,88 +47,17 @@ ValueCheck Fraction() {
   };
 }
 
-Option& Option::TypeName(const std::string& name) {
-  option_->type_name(name);
-  return *this;
-}
-
-Option& Option::Required() {
-  option_->required();
-  return *this;
-}
-
-Option& Option::Excludes(const Option& other) {
-  option_->excludes(other.option_);
-  return *this;
-}
-
-Option& Option::Needs(const Option& other) {
-  option_->needs(other.option_);
-  return *this;
-}
-
-Option& Option::Check(const ValueCheck& check) {
-  option_->check(CLI::Validator([check](std::string& text) { return check(text); }, ""));
-  return *this;
-}
-
-Option& Option::OneOf(std::initializer_list<const char*> values) {
-  option_->check(CLI::IsMember(std::vector<std::string>(values.begin(), values.end())));
-  return *this;
-}
-
-Option& Option::Repeatable() {
-  option_->allow_extra_args(false);
-  return *this;
-}
-
-Option& Option::Delimiter(char delimiter) {
-  option_->delimiter(delimiter);
-  return *this;
-}
-
-Option& Option::ShowDefault() {
-  option_->capture_default_str();
-  return *this;
-}
-
-template <typename Value>
-Option Command::AddOption(const std::string& name, Value* value, const std::string& help) {
-  const size_t blank = name.find(' ');
-  Option option(app_->add_option(name.substr(0, blank), *value, help));
-  option.Check([](const std::string& text) { return text.empty() ? "must not be empty" : ""; });
-  return blank == std::string::npos ? option : option.TypeName(name.substr(blank + 1));
-}
-
-Option Command::AddFlag(const std::string& name, bool* value, const std::string& help) {
-  return Option(app_->add_flag(name, *value, help));
-}
-
-Option Command::AddFlag(const std::string& name, const std::string& help) {
-  return Option(app_->add_flag(name, help));
-}
-
-Command Command::Under(const std::string& heading) const {
-  Command command = *this;
-  command.heading_ = heading;
+CLI::App* AddCommand(CLI::App* app, const std::string& name, const std::string& help,
+                     const std::array<const char*, 2>& examples) {
+  CLI::App* const command = app->add_subcommand(name, help);
+  command->footer(std::string("Examples:\n  ") + examples[0] + "\n  " + examples[1]);
   return command;
 }
 
-Command Command::AddCommand(const std::string& name, const std::string& help,
-                            const std::array<const char*, 2>& examples) {
-  CLI::App* const command = app_->add_subcommand(name, help);
-  // Which it would have of the program otherwise.
-  command->group(heading_.empty() ? "Subcommands" : heading_);
-  command->footer(std::string("Examples:\n  ") + examples[0] + "\n  " + examples[1]);
-  return {command, exit_code_};
-}
-
-bool Command::is_given(const std::string& option) const { return app_->count(option) > 0; }
-
-void Command::RequireCommand() { app_->require_subcommand(1); }
-
-void Command::SetAction(const std::function<int()>& action) {
-  app_->callback([action, exit_code = exit_code_] { *exit_code = action(); });
+ExitCode ReportFailure(const std::string& why) {
+  std::fflush(stdout);
+  Warn(why);
+  return kFailure;
 }
 
 namespace {
@@ -153,56 +83,6 @@ class HelpFormatter : public CLI::Formatter {
     return Wrap(Formatter::make_description(app), 0) + "\n";
   }
 };
-
-}  // namespace
-
-CommandLine::CommandLine(const std::string& program, const std::string& help, const std::string& version)
-    : app_(std::make_unique<CLI::App>(help, program)) {
-  app_->formatter(std::make_shared<HelpFormatter>());
-  app_->set_version_flag("--version", version);
-  app_->footer(program + " A B, with two files of robots, is " + program + " consistency A B.");
-}
-
-CommandLine::~CommandLine() = default;
-
-namespace {
-
-void DescribeCommand(const CLI::App& app, const std::string& name, std::vector<CommandHelp>* all) {
-  CommandHelp help{name, {}, {}};
-  for (const CLI::Option* option : app.get_options()) {
-    OptionHelp one;
-    one.is_positional = option->get_positional();
-    if (one.is_positional) {
-      one.names = {option->get_name(true)};
-    } else {
-      for (const std::string& word : option->get_snames()) one.names.push_back("-" + word);
-      for (const std::string& word : option->get_lnames()) one.names.push_back("--" + word);
-    }
-    help.options.push_back(one);
-  }
-  const std::vector<const CLI::App*> commands = app.get_subcommands([](const CLI::App*) { return true; });
-  for (const CLI::App* command : commands) help.commands.push_back(command->get_name());
-  all->push_back(help);
-  for (const CLI::App* command : commands) {
-    DescribeCommand(*command, (name.empty() ? "" : name + " ") + command->get_name(), all);
-  }
-}
-
-}  // namespace
-
-ExitCode ReportFailure(const std::string& why) {
-  std::fflush(stdout);
-  Warn(why);
-  return kFailure;
-}
-
-std::vector<CommandHelp> CommandLine::Describe() const {
-  std::vector<CommandHelp> all;
-  DescribeCommand(*app_, "", &all);
-  return all;
-}
-
-namespace {
 
 /// Whether the word names a file that may describe a robot.
 bool NamesRobot(std::string_view word) {
@@ -239,42 +119,21 @@ std::vector<std::string> CompleteWords(int argc, char** argv) {
   return words;
 }
 
-}  // namespace
-
-int CommandLine::Run(int argc, char** argv) {
-  try {
-    const std::vector<std::string> words = CompleteWords(argc, argv);
-    std::vector<const char*> pointers;
-    pointers.reserve(words.size());
-    for (const std::string& word : words) pointers.push_back(word.c_str());
-    app_->parse(static_cast<int>(pointers.size()), pointers.data());
-    return exit_code_;
-  } catch (const CLI::Success& success) {
-    // By way of a text: whether standard output takes it is the caller's to see.
-    std::ostringstream help;
-    const int exit_code = app_->exit(success, help, help);
-    std::fputs(help.str().c_str(), stdout);
-    return exit_code;
-  } catch (const CLI::ParseError& error) {
-    throw UsageError(Explain(error.what()) + NameHelp());
-  } catch (const UsageError& error) {
-    throw UsageError(error.what() + NameHelp());
-  }
-}
-
-std::string CommandLine::NameHelp() const {
-  std::string words = app_->get_name();
-  for (const CLI::App* at = app_.get(); !at->get_subcommands().empty();) {
+/// " (see dexcheck study run --help)", of the command that was given.
+std::string NameHelp(const CLI::App& app) {
+  std::string words = app.get_name();
+  for (const CLI::App* at = &app; !at->get_subcommands().empty();) {
     at = at->get_subcommands().front();
     words += " " + at->get_name();
   }
   return " (see " + words + " --help)";
 }
 
-std::string CommandLine::Explain(const std::string& what) const {
-  const std::vector<std::string> unknown = app_->remaining(/*recurse=*/true);
-  const std::vector<CLI::App*> chosen = app_->get_subcommands();
-  const CLI::App& place = chosen.empty() ? *app_ : *chosen.front();
+/// Says what is wrong with the words. @param what by CLI11.
+std::string Explain(const CLI::App& app, const std::string& what) {
+  const std::vector<std::string> unknown = app.remaining(/*recurse=*/true);
+  const std::vector<CLI::App*> chosen = app.get_subcommands();
+  const CLI::App& place = chosen.empty() ? app : *chosen.front();
   if (unknown.empty()) {
     std::string text = what;
     for (const CLI::Option* option : place.get_options()) {  // "A" and not "--robot", which means the same
@@ -297,16 +156,31 @@ std::string CommandLine::Explain(const std::string& what) const {
   return "unknown " + kind + " " + Quote(word) + SuggestNearest(word, known);
 }
 
-template Option Command::AddOption(const std::string&, std::string*, const std::string&);
-template Option Command::AddOption(const std::string&, std::filesystem::path*, const std::string&);
-template Option Command::AddOption(const std::string&, double*, const std::string&);
-template Option Command::AddOption(const std::string&, int*, const std::string&);
-template Option Command::AddOption(const std::string&, long*, const std::string&);
-template Option Command::AddOption(const std::string&, std::uint64_t*, const std::string&);
-template Option Command::AddOption(const std::string&, std::optional<double>*, const std::string&);
-template Option Command::AddOption(const std::string&, std::vector<double>*, const std::string&);
-template Option Command::AddOption(const std::string&, std::vector<std::string>*, const std::string&);
-template Option Command::AddOption(const std::string&, std::vector<std::filesystem::path>*,
-                                   const std::string&);
+}  // namespace
+
+std::shared_ptr<CLI::FormatterBase> MakeHelpFormatter() { return std::make_shared<HelpFormatter>(); }
+
+int RunCommandLine(CLI::App* app, int argc, char** argv) {
+  try {
+    const std::vector<std::string> words = CompleteWords(argc, argv);
+    std::vector<const char*> pointers;
+    pointers.reserve(words.size());
+    for (const std::string& word : words) pointers.push_back(word.c_str());
+    app->parse(static_cast<int>(pointers.size()), pointers.data());
+    return kSuccess;
+  } catch (const CLI::RuntimeError& end) {
+    return end.get_exit_code();
+  } catch (const CLI::Success& success) {
+    // By way of a text: whether standard output takes it is the caller's to see.
+    std::ostringstream help;
+    const int exit_code = app->exit(success, help, help);
+    std::fputs(help.str().c_str(), stdout);
+    return exit_code;
+  } catch (const CLI::ParseError& error) {
+    throw UsageError(Explain(*app, error.what()) + NameHelp(*app));
+  } catch (const UsageError& error) {
+    throw UsageError(error.what() + NameHelp(*app));
+  }
+}
 
 }  // namespace dexcheck::cli

@@ -27,8 +27,8 @@ struct RobotFiles {
 };
 
 /// Adds the positional arguments A and B, which --robot and --mjcf name, too. @returns both.
-std::array<Option, 2> AddFileOptions(Command command, const std::string& help_a, const std::string& help_b,
-                                     RobotFiles* files);
+std::array<CLI::Option*, 2> AddFileOptions(CLI::App* command, const std::string& help_a,
+                                           const std::string& help_b, RobotFiles* files);
 
 /// A controller of the user's own in the place of a scenario's.
 struct OwnController {
@@ -39,7 +39,7 @@ struct OwnController {
 };
 
 /// Adds --controller and --controller-time-limit. @returns the first.
-Option AddControllerOptions(Command command, OwnController* controller);
+CLI::Option* AddControllerOptions(CLI::App* command, OwnController* controller);
 
 /// Changes of a scenario.
 struct Overrides {
@@ -52,62 +52,63 @@ struct Overrides {
 };
 
 /// Adds --set and --unset, and AddControllerOptions. @returns the three, without the time limit.
-std::array<Option, 3> AddOverrideOptions(Command command, Overrides* overrides);
+std::array<CLI::Option*, 3> AddOverrideOptions(CLI::App* command, Overrides* overrides);
 
 /// Adds --jobs. @param what is made: "Trials". @param jobs 0 for one on each processor, as CountJobs reads
 /// it.
-Option AddJobsOption(Command command, const std::string& what, std::uint64_t* jobs);
+CLI::Option* AddJobsOption(CLI::App* command, const std::string& what, std::uint64_t* jobs);
 int CountJobs(std::uint64_t jobs);
 
 /// Adds --seed. @param help what is drawn by it.
-Option AddSeedOption(Command command, std::uint64_t* seed,
-                     const std::string& help = "Seed of random changes to posture and grasp; 0 for none");
+CLI::Option* AddSeedOption(
+    CLI::App* command, std::uint64_t* seed,
+    const std::string& help = "Seed of random changes to posture and grasp; 0 for none");
 
 /// Adds --samples, of at most `most`, and --seed: the random states at which two descriptions are compared.
 template <typename Count>
-std::array<Option, 2> AddSampleOptions(Command command, std::uint64_t most, Count* samples,
-                                       std::uint64_t* seed,
-                                       const std::string& help = "Number of random states") {
-  return {command.AddOption("--samples N", samples, help).Check(WholeNumber(1, most)).ShowDefault(),
-          AddSeedOption(command, seed, "Seed of the random states").ShowDefault()};
+std::array<CLI::Option*, 2> AddSampleOptions(CLI::App* command, std::uint64_t most, Count* samples,
+                                             std::uint64_t* seed,
+                                             const std::string& help = "Number of random states") {
+  return {
+      AddOption(command, "--samples N", samples, help)->check(WholeNumber(1, most))->capture_default_str(),
+      AddSeedOption(command, seed, "Seed of the random states")->capture_default_str()};
 }
 
 /// Adds --json [FILE]: JSON to this file; without a file, or with "-", to standard output and nothing else.
 /// @param what the file gets: "the findings".
-Option AddJsonOption(Command command, const std::string& what, std::string* file);
+CLI::Option* AddJsonOption(CLI::App* command, const std::string& what, std::string* file);
 
 /// Adds --junit.
-Option AddJUnitOption(Command command, std::string* file);
+CLI::Option* AddJUnitOption(CLI::App* command, std::string* file);
 
 /// Adds --ignore: constants of joints that two descriptions need not share.
-Option AddIgnoreOption(Command command, std::vector<std::string>* ignore);
+CLI::Option* AddIgnoreOption(CLI::App* command, std::vector<std::string>* ignore);
 
 /// Adds --package and --floating.
-void AddUrdfOptions(Command command, UrdfOptions* options);
+void AddUrdfOptions(CLI::App* command, UrdfOptions* options);
 
 /// Each adds its command to `app`.
-void AddAuditCommand(Command app);
-void AddJudgeCommand(Command app);
-void AddConsistencyCommand(Command app);
-void AddDiagnoseCommand(Command app);
-void AddMutateCommand(Command app);
-void AddEvalCommand(Command app);
-void AddImportCommand(Command app);
-void AddInitCommand(Command app);
+void AddAuditCommand(CLI::App* app);
+void AddJudgeCommand(CLI::App* app);
+void AddConsistencyCommand(CLI::App* app);
+void AddDiagnoseCommand(CLI::App* app);
+void AddMutateCommand(CLI::App* app);
+void AddEvalCommand(CLI::App* app);
+void AddImportCommand(CLI::App* app);
+void AddInitCommand(CLI::App* app);
 /// @param command_line as typed, to be kept in the log.
-void AddRunCommand(Command app, const std::string& command_line);
-void AddBudgetCommand(Command app);
-void AddCompareCommand(Command app);
-void AddExciteCommand(Command app);
-void AddExportCommand(Command app);
-void AddEngineComparisonCommand(Command app);
-void AddRenderCommand(Command app);
-void AddReportCommand(Command app);
-/// @param line is described when the command runs.
-void AddHelpCommands(Command app, const CommandLine& line);
-void AddStudyCommand(Command app);
+void AddRunCommand(CLI::App* app, const std::string& command_line);
+void AddBudgetCommand(CLI::App* app);
+void AddCompareCommand(CLI::App* app);
+void AddExciteCommand(CLI::App* app);
+void AddExportCommand(CLI::App* app);
+void AddEngineComparisonCommand(CLI::App* app);
+void AddRenderCommand(CLI::App* app);
+void AddReportCommand(CLI::App* app);
+void AddHelpCommands(CLI::App* app);
+void AddStudyCommand(CLI::App* app);
 /// Those of its commands that read a study's database: report, show, export.
-void AddStudyReadCommands(Command study);
+void AddStudyReadCommands(CLI::App* study);
 
 // Options that the commands which compare descriptions of a robot have in common.
 
@@ -123,16 +124,15 @@ struct ToleranceOptions {
 };
 
 /// Adds the two options, of which one may be given. @returns them.
-inline std::array<Option, 2> AddToleranceOptions(Command command, ToleranceOptions* options) {
+inline std::array<CLI::Option*, 2> AddToleranceOptions(CLI::App* command, ToleranceOptions* options) {
   constexpr int kMostDigits = 15;
-  const Option digits = command
-                            .AddOption("--digits N", &options->digits,
-                                       "Agreement to this many digits of a term's scale is enough")
-                            .Check(WholeNumber(1, kMostDigits));
-  const Option tolerance =
-      command.AddOption("--tolerance REL", &options->tolerance, "The same as a relative tolerance")
-          .Check(Fraction())
-          .Excludes(digits);
+  CLI::Option* const digits = AddOption(command, "--digits N", &options->digits,
+                                        "Agreement to this many digits of a term's scale is enough")
+                                  ->check(WholeNumber(1, kMostDigits));
+  CLI::Option* const tolerance =
+      AddOption(command, "--tolerance REL", &options->tolerance, "The same as a relative tolerance")
+          ->check(Fraction())
+          ->excludes(digits);
   return {digits, tolerance};
 }
 

@@ -132,34 +132,32 @@ int Run(CompareRequest request) {
 
 }  // namespace
 
-void AddCompareCommand(Command app) {
-  auto [command, request] = app.AddRequest<CompareRequest>(
-      "compare", "Compare runs: inputs, results, checks and signals; or, with --model, recordings of a robot",
+void AddCompareCommand(CLI::App* app) {
+  const auto [command, request] = AddRequest<CompareRequest>(
+      app, "compare",
+      "Compare runs: inputs, results, checks and signals; or, with --model, recordings of a robot",
       {"dexcheck compare run_a run_b --page comparison.html",
        "dexcheck compare run_a run_b --tolerance 1e-9"});
-  command
-      .AddOption("RUN_DIR", &request->run_folders,
-                 "Folders of runs, or recordings; the first is what the others are compared with")
-      .Required()
-      .TypeName("RUN_DIR...");
-  command.AddOption(
-      "--tolerance REL", &request->tolerance,
-      "Exit with 1 when a signal differs by more than this fraction of its size, or a verdict differs");
-  command
-      .AddOption("--signals A,B,...", &request->options.patterns,
-                 "Only these signals; * stands for any text: object/*,tau")
-      .Delimiter(',')
-      .Repeatable();
-  command.AddOption("--page FILE.html", &request->page,
-                    "Write a page with the signals overlaid and subtracted");
-  const Option model =
-      command.AddOption("--model MODEL", &request->model,
-                        "Parameter file, URDF or MJCF of the robot of two recordings: what differs is named");
-  command.AddOption("--columns FILE.toml", &request->columns, "Which column of the recordings is what")
-      .Needs(model);
+  AddOption(command, "RUN_DIR", &request->run_folders,
+            "Folders of runs, or recordings; the first is what the others are compared with")
+      ->required()
+      ->type_name("RUN_DIR...");
+  AddOption(command, "--tolerance REL", &request->tolerance,
+            "Exit with 1 when a signal differs by more than this fraction of its size, or a verdict differs");
+  AddOption(command, "--signals A,B,...", &request->options.patterns,
+            "Only these signals; * stands for any text: object/*,tau")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  AddOption(command, "--page FILE.html", &request->page,
+            "Write a page with the signals overlaid and subtracted");
+  CLI::Option* const model =
+      AddOption(command, "--model MODEL", &request->model,
+                "Parameter file, URDF or MJCF of the robot of two recordings: what differs is named");
+  AddOption(command, "--columns FILE.toml", &request->columns, "Which column of the recordings is what")
+      ->needs(model);
   AddJsonOption(command, "the numbers", &request->json);
-  command.AddFlag("--all", &request->all, "Print all checks and signals");
-  command.AddFlag("--quiet", &request->quiet, "Print the last line only");
+  command->add_flag("--all", request->all, "Print all checks and signals");
+  command->add_flag("--quiet", request->quiet, "Print the last line only");
 }
 
 }  // namespace dexcheck::cli

@@ -80,46 +80,43 @@ int Run(ConsistencyRequest request) {
 
 }  // namespace
 
-void AddConsistencyCommand(Command app) {
+void AddConsistencyCommand(CLI::App* app) {
   constexpr std::uint64_t kMaxSamples = 1000000000;
   const auto request = std::make_shared<ConsistencyRequest>();
-  Command command = app.AddCommand("consistency", "Compare every term of model and engine at random states",
-                                   {"dexcheck arm.urdf arm.xml --page files.html",
-                                    "dexcheck consistency arm.urdf --program 'python3 mine.py'"});
+  CLI::App* command =
+      AddCommand(app, "consistency", "Compare every term of model and engine at random states",
+                 {"dexcheck arm.urdf arm.xml --page files.html",
+                  "dexcheck consistency arm.urdf --program 'python3 mine.py'"});
   AddFileOptions(command, "A description of a robot: parameter file (TOML), URDF or MJCF",
                  "Another one of the same robot; without both, the shipped pair", &request->files);
-  const Option program = command.AddOption(
-      "--program CMD", &request->source.program,
-      "Command of a program that provides terms, instead of B (harness/descriptions/README.md)");
-  command
-      .AddOption("--results FOLDER", &request->source.results,
-                 "Folder with states as eval --states writes them and NumPy arrays of results, instead of B")
-      .Excludes(program);
-  command
-      .AddOption("--time-limit S", &request->source.program_options.seconds,
-                 "For each result of the program, s")
-      .Check(PositiveNumber("must be a number above 0"))
-      .ShowDefault();
+  CLI::Option* const program =
+      AddOption(command, "--program CMD", &request->source.program,
+                "Command of a program that provides terms, instead of B (harness/descriptions/README.md)");
+  AddOption(command, "--results FOLDER", &request->source.results,
+            "Folder with states as eval --states writes them and NumPy arrays of results, instead of B")
+      ->excludes(program);
+  AddOption(command, "--time-limit S", &request->source.program_options.seconds,
+            "For each result of the program, s")
+      ->check(PositiveNumber("must be a number above 0"))
+      ->capture_default_str();
   AddUrdfOptions(command, &request->urdf);
   AddSampleOptions(command, kMaxSamples, &request->options.samples, &request->options.seed);
   AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
-  command.AddOption("--page FILE.html", &request->page_file,
-                    "Write a page that loads nothing: both robots in one view, what differs, and the causes");
+  AddOption(command, "--page FILE.html", &request->page_file,
+            "Write a page that loads nothing: both robots in one view, what differs, and the causes");
   AddJudgingOptions(command, request.get());
-  command
-      .AddOption("--ignore WORD,...", &request->ignore,
-                 "Constants of joints in which the two may differ: armature, damping, friction, coupling to "
-                 "others, effort; or links to leave out with all that they carry")
-      .Delimiter(',');
-  command.AddOption("--only LINK", &request->options.part.only,
-                    "Compare this link or joint and what it carries; all else is held");
-  command
-      .AddOption("--lock JOINT[=VALUE]", &request->lock,
-                 "Hold a joint at a value (0), rad or m; may be given again")
-      .Repeatable();
-  command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
-  command.SetAction([=] { return Run(*request); });
+  AddOption(command, "--ignore WORD,...", &request->ignore,
+            "Constants of joints in which the two may differ: armature, damping, friction, coupling to "
+            "others, effort; or links to leave out with all that they carry")
+      ->delimiter(',');
+  AddOption(command, "--only LINK", &request->options.part.only,
+            "Compare this link or joint and what it carries; all else is held");
+  AddOption(command, "--lock JOINT[=VALUE]", &request->lock,
+            "Hold a joint at a value (0), rad or m; may be given again")
+      ->allow_extra_args(false);
+  command->add_flag("--quiet", request->quiet, "Print the verdict only");
+  SetAction(command, [=] { return Run(*request); });
 }
 
 }  // namespace dexcheck::cli

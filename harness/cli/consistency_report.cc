@@ -170,20 +170,19 @@ Answer AnswerByTerms(const ConsistencyRequest& request, const Comparison& compar
 
 }  // namespace
 
-void AddJudgingOptions(Command command, ConsistencyRequest* request) {
-  const std::array<Option, 2> tolerance = AddToleranceOptions(command, &request->judging);
+void AddJudgingOptions(CLI::App* command, ConsistencyRequest* request) {
+  const std::array<CLI::Option*, 2> tolerance = AddToleranceOptions(command, &request->judging);
   command
-      .AddFlag("--exact", &request->exact,
-               "Two files must agree to rounding, not only within the digits that they print")
-      .Excludes(tolerance[0])
-      .Excludes(tolerance[1]);
-  command
-      .AddOption("--precision PERCENT", &request->precision,
-                 "Coarsest printed precision that still counts as agreement, % of a number's size")
-      .Check(PositiveNumber())
-      .Excludes(tolerance[0])
-      .Excludes(tolerance[1])
-      .ShowDefault();
+      ->add_flag("--exact", request->exact,
+                 "Two files must agree to rounding, not only within the digits that they print")
+      ->excludes(tolerance[0])
+      ->excludes(tolerance[1]);
+  AddOption(command, "--precision PERCENT", &request->precision,
+            "Coarsest printed precision that still counts as agreement, % of a number's size")
+      ->check(PositiveNumber())
+      ->excludes(tolerance[0])
+      ->excludes(tolerance[1])
+      ->capture_default_str();
 }
 
 namespace {

@@ -54,7 +54,7 @@ struct ConsistencyRequest {
 };
 
 /// Adds --digits, --tolerance, --exact and --precision.
-void AddJudgingOptions(Command command, ConsistencyRequest* request);
+void AddJudgingOptions(CLI::App* command, ConsistencyRequest* request);
 
 /// Compares two files, or a file and the terms that stand in the place of the other, as the request says.
 /// Every command that judges a pair of files does it by this function.

@@ -131,9 +131,9 @@ int Run(DiagnoseRequest request) {
 
 }  // namespace
 
-void AddDiagnoseCommand(Command app) {
-  auto [command, request] = app.AddRequest<DiagnoseRequest>(
-      "diagnose", "Say why two descriptions differ, and repair the first",
+void AddDiagnoseCommand(CLI::App* app) {
+  const auto [command, request] = AddRequest<DiagnoseRequest>(
+      app, "diagnose", "Say why two descriptions differ, and repair the first",
       {"dexcheck diagnose arm.urdf arm.xml", "dexcheck diagnose arm.urdf arm.xml --write repaired.urdf"});
   AddFileOptions(command, "The description that may be wrong: parameter file (TOML), URDF or MJCF",
                  "Another one of the same robot; without both, the shipped pair", &request->files);
@@ -143,14 +143,12 @@ void AddDiagnoseCommand(Command app) {
   const auto is_file = [](const std::string& name) {
     return name == "-" ? "must be a file, got -" : std::string();
   };
-  command
-      .AddOption(
-          "--write FILE", &request->repaired_file,
-          "Write the first description with its causes corrected to this file, and compare it with the "
-          "second")
-      .Check(is_file);
+  AddOption(command, "--write FILE", &request->repaired_file,
+            "Write the first description with its causes corrected to this file, and compare it with the "
+            "second")
+      ->check(is_file);
   AddJsonOption(command, "the results", &request->json_file);
-  command.AddFlag("--quiet", &request->quiet, "No progress");
+  command->add_flag("--quiet", request->quiet, "No progress");
 }
 
 }  // namespace dexcheck::cli

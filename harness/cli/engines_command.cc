@@ -186,38 +186,36 @@ int Run(EnginesRequest request) {
 
 }  // namespace
 
-void AddEngineComparisonCommand(Command app) {
-  auto [command, request] = app.AddRequest<EnginesRequest>(
-      "engines", "Compare one robot's terms in several physics engines, pair by pair",
+void AddEngineComparisonCommand(CLI::App* app) {
+  const auto [command, request] = AddRequest<EnginesRequest>(
+      app, "engines", "Compare one robot's terms in several physics engines, pair by pair",
       {"dexcheck engines arm.urdf", "dexcheck engines arm.urdf --engine 'mine=python3 mine.py'"});
   request->options.states.samples = 100;
-  command.AddOption("ROBOT", &request->robot, "URDF; with fewer engines an MJCF or a parameter file (TOML)")
-      .TypeName("FILE")
-      .Required();
+  AddOption(command, "ROBOT", &request->robot, "URDF; with fewer engines an MJCF or a parameter file (TOML)")
+      ->type_name("FILE")
+      ->required();
   std::string names;
   for (const EngineComparisonEngine& engine : ListEngineComparisonEngines())
     names += (names.empty() ? "" : ", ") + engine.name;
-  command
-      .AddOption("--engines NAME,...", &request->options.engines,
-                 "Which of " + names + "; all that are there when none is named")
-      .Delimiter(',');
-  command
-      .AddOption("--engine NAME=CMD", &request->options.programs,
-                 "One more: a program of your own that provides terms (harness/descriptions/README.md)")
-      .Repeatable();
-  command.AddOption("--mjcf FILE.xml", &request->options.mjcf, "What MuJoCo reads instead of ROBOT");
-  command.AddOption("--node-modules FOLDER", &request->options.node_modules,
-                    "Folder where npm installed @mujoco/mujoco");
-  command.AddFlag("--floating", &request->urdf.floating, "The root of a URDF floats");
+  AddOption(command, "--engines NAME,...", &request->options.engines,
+            "Which of " + names + "; all that are there when none is named")
+      ->delimiter(',');
+  AddOption(command, "--engine NAME=CMD", &request->options.programs,
+            "One more: a program of your own that provides terms (harness/descriptions/README.md)")
+      ->allow_extra_args(false);
+  AddOption(command, "--mjcf FILE.xml", &request->options.mjcf, "What MuJoCo reads instead of ROBOT");
+  AddOption(command, "--node-modules FOLDER", &request->options.node_modules,
+            "Folder where npm installed @mujoco/mujoco");
+  command->add_flag("--floating", request->urdf.floating, "The root of a URDF floats");
   AddSampleOptions(command, 1000000, &request->options.states.samples, &request->options.states.seed);
-  command
-      .AddOption("--digits N", &request->digits, "Agreement to this many digits of a term's scale is enough")
-      .Check(WholeNumber(1, 15))
-      .ShowDefault();
+  AddOption(command, "--digits N", &request->digits,
+            "Agreement to this many digits of a term's scale is enough")
+      ->check(WholeNumber(1, 15))
+      ->capture_default_str();
   AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
   AddIgnoreOption(command, &request->options.states.ignore);
-  command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
+  command->add_flag("--quiet", request->quiet, "Print the verdict only");
 }
 
 }  // namespace dexcheck::cli

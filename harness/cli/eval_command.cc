@@ -404,40 +404,37 @@ int Run(const EvalRequest& request) {
 
 }  // namespace
 
-void AddEvalCommand(Command app) {
+void AddEvalCommand(CLI::App* app) {
   constexpr long kMostStates = 1000000;
-  auto [command, request] = app.AddRequest<EvalRequest>(
-      "eval", "Print every term at one state, as JSON; or write random states for your own program",
+  const auto [command, request] = AddRequest<EvalRequest>(
+      app, "eval", "Print every term at one state, as JSON; or write random states for your own program",
       {"dexcheck eval arm.toml arm.xml --state state.json",
        "dexcheck eval arm.urdf --states 1000 --out states"});
-  const Option robot = command.AddOption(
-      "ROBOT,--robot", &request->robot,
+  CLI::Option* const robot = AddOption(
+      command, "ROBOT,--robot", &request->robot,
       "Parameter file (TOML) of the analytic model, the shipped one by default; with --states a URDF or an "
       "MJCF, too");
-  const Option mjcf =
-      command
-          .AddOption("MJCF,--mjcf", &request->mjcf,
-                     "The same robot for the engine: adds the engine's values of the terms as \"engine\"")
-          .Needs(robot);
-  const Option state =
-      command.AddOption("--state STATE.json", &request->state_file,
-                        "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu, law");
-  Option out = command
-                   .AddOption("--out FILE.json|DIR", &request->out,
-                              "File to write (- for standard output); with --states a folder")
-                   .ShowDefault();
-  const Option json = AddJsonOption(command, "the terms", &request->out).Excludes(out);
-  const Option states = command
-                            .AddOption("--states N", &request->states,
-                                       "Write so many random states as layout.json, states.jsonl, q.npy and "
-                                       "v.npy, for a program whose results consistency --results reads")
-                            .Check(WholeNumber(1, kMostStates))
-                            .Needs(robot)
-                            .Needs(out)
-                            .Excludes(state)
-                            .Excludes(mjcf)
-                            .Excludes(json);
-  AddSeedOption(command, &request->seed, "Seed of the random states").ShowDefault().Needs(states);
+  CLI::Option* const mjcf =
+      AddOption(command, "MJCF,--mjcf", &request->mjcf,
+                "The same robot for the engine: adds the engine's values of the terms as \"engine\"")
+          ->needs(robot);
+  CLI::Option* const state =
+      AddOption(command, "--state STATE.json", &request->state_file,
+                "JSON with q, xi; optionally object, kappa or contact_points, fingers, mu, law");
+  CLI::Option* const out = AddOption(command, "--out FILE.json|DIR", &request->out,
+                                     "File to write (- for standard output); with --states a folder")
+                               ->capture_default_str();
+  CLI::Option* const json = AddJsonOption(command, "the terms", &request->out)->excludes(out);
+  CLI::Option* const states = AddOption(command, "--states N", &request->states,
+                                        "Write so many random states as layout.json, states.jsonl, q.npy and "
+                                        "v.npy, for a program whose results consistency --results reads")
+                                  ->check(WholeNumber(1, kMostStates))
+                                  ->needs(robot)
+                                  ->needs(out)
+                                  ->excludes(state)
+                                  ->excludes(mjcf)
+                                  ->excludes(json);
+  AddSeedOption(command, &request->seed, "Seed of the random states")->capture_default_str()->needs(states);
   AddUrdfOptions(command, &request->urdf);
 }
 

@@ -124,31 +124,33 @@ int Run(MotionRequest request) {
 
 }  // namespace
 
-void AddExciteCommand(Command app) {
-  auto [command, request] = app.AddRequest<MotionRequest>(
-      "excite", "Make a motion to record with a robot, in which errors of its model show best within limits",
+void AddExciteCommand(CLI::App* app) {
+  const auto [command, request] = AddRequest<MotionRequest>(
+      app, "excite",
+      "Make a motion to record with a robot, in which errors of its model show best within limits",
       {"dexcheck excite arm.urdf --out motion.csv", "dexcheck excite arm.urdf --limits limits.toml"});
-  command.AddOption("MODEL,--model", &request->model, "The robot: a parameter file, URDF or MJCF").Required();
-  command.AddOption("--out FILE.csv", &request->motion_file,
-                    "The motion: t, q, qd, qdd and the model's torques");
-  command
-      .AddOption("--recording FILE", &request->recorded, "What was recorded already: the motion adds to it")
-      .Repeatable();
-  command.AddOption("--columns FILE.toml", &request->columns, "Which column of the recordings is what");
-  command.AddOption("--limits FILE.toml", &request->limits, "Ranges, velocities, accelerations and torques");
-  command.AddOption("--mjcf FILE", &request->mjcf, "The robot's shapes, which must not overlap");
-  command.AddOption("--duration S", &request->options.duration, "How long the motion takes, s")
-      .Check(NumberFrom(1.0, 3600.0))
-      .ShowDefault();
-  command.AddOption("--rate HZ", &request->options.rate, "Rows per second")
-      .Check(NumberFrom(1.0, 1e5))
-      .ShowDefault();
-  command.AddOption("--motions N", &request->options.evaluations, "How many motions to try")
-      .Check(WholeNumber(1, 1000000))
-      .ShowDefault();
+  AddOption(command, "MODEL,--model", &request->model, "The robot: a parameter file, URDF or MJCF")
+      ->required();
+  AddOption(command, "--out FILE.csv", &request->motion_file,
+            "The motion: t, q, qd, qdd and the model's torques");
+  AddOption(command, "--recording FILE", &request->recorded,
+            "What was recorded already: the motion adds to it")
+      ->allow_extra_args(false);
+  AddOption(command, "--columns FILE.toml", &request->columns, "Which column of the recordings is what");
+  AddOption(command, "--limits FILE.toml", &request->limits, "Ranges, velocities, accelerations and torques");
+  AddOption(command, "--mjcf FILE", &request->mjcf, "The robot's shapes, which must not overlap");
+  AddOption(command, "--duration S", &request->options.duration, "How long the motion takes, s")
+      ->check(NumberFrom(1.0, 3600.0))
+      ->capture_default_str();
+  AddOption(command, "--rate HZ", &request->options.rate, "Rows per second")
+      ->check(NumberFrom(1.0, 1e5))
+      ->capture_default_str();
+  AddOption(command, "--motions N", &request->options.evaluations, "How many motions to try")
+      ->check(WholeNumber(1, 1000000))
+      ->capture_default_str();
   AddSeedOption(command, &request->options.seed, "Of the motions that are drawn at first");
   AddJsonOption(command, "the results", &request->json_file);
-  command.AddFlag("--quiet", &request->quiet, "Print the last line only");
+  command->add_flag("--quiet", request->quiet, "Print the last line only");
 }
 
 }  // namespace dexcheck::cli

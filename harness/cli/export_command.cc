@@ -192,26 +192,26 @@ int Run(const ExportRequest& request) {
 
 }  // namespace
 
-void AddExportCommand(Command app) {
-  auto [command, request] = app.AddRequest<ExportRequest>(
-      "export", "Write a run's log as a table of numbers (CSV) or as messages (MCAP)",
+void AddExportCommand(CLI::App* app) {
+  const auto [command, request] = AddRequest<ExportRequest>(
+      app, "export", "Write a run's log as a table of numbers (CSV) or as messages (MCAP)",
       {"dexcheck export my_run --list", "dexcheck export my_run --csv run.csv --signals 'object/*,tau'"});
-  command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run, with its log.h5").Required();
-  Option csv =
-      command.AddOption("--csv FILE.csv", &request->csv_file, "File to write (- for standard output)");
-  Option mcap = command.AddOption("--mcap FILE.mcap", &request->mcap_file,
-                                  "File of messages for Foxglove or PlotJuggler, a topic for each signal");
-  command
-      .AddOption("--signals A,B,...", &request->patterns,
-                 "Only time and these signals; * stands for any text: time,object/*,check/M_bar")
-      .Delimiter(',')
-      .Repeatable();
-  command.AddOption("--every N", &request->every, "Only the first of every N rows")
-      .Check(WholeNumber(1, std::numeric_limits<int>::max()))
-      .ShowDefault();
-  command.AddFlag("--list", &request->list, "Print the signals, their units and descriptions")
-      .Excludes(csv)
-      .Excludes(mcap);
+  AddOption(command, "RUN_DIR", &request->run_folder, "Folder of the run, with its log.h5")->required();
+  CLI::Option* const csv =
+      AddOption(command, "--csv FILE.csv", &request->csv_file, "File to write (- for standard output)");
+  CLI::Option* const mcap =
+      AddOption(command, "--mcap FILE.mcap", &request->mcap_file,
+                "File of messages for Foxglove or PlotJuggler, a topic for each signal");
+  AddOption(command, "--signals A,B,...", &request->patterns,
+            "Only time and these signals; * stands for any text: time,object/*,check/M_bar")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  AddOption(command, "--every N", &request->every, "Only the first of every N rows")
+      ->check(WholeNumber(1, std::numeric_limits<int>::max()))
+      ->capture_default_str();
+  command->add_flag("--list", request->list, "Print the signals, their units and descriptions")
+      ->excludes(csv)
+      ->excludes(mcap);
   AddJsonOption(command, "what --list prints", &request->json_file);
 }
 

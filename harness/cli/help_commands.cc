@@ -20,11 +20,16 @@ std::string Join(const std::vector<std::string>& words, const char* between) {
   return fmt::format("{}", fmt::join(words, between));
 }
 
+std::vector<const CLI::App*> ListCommands(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App*) { return true; });
+}
+
 /// Commands or scenarios that may follow a command.
-std::vector<std::string> ListNextWords(const CommandHelp& command) {
-  std::vector<std::string> words = command.commands;
-  const bool takes_scenario = std::ranges::any_of(command.options, [](const OptionHelp& option) {
-    return option.is_positional && option.names.front().find("SCENARIO") != std::string::npos;
+std::vector<std::string> ListNextWords(const CLI::App& command) {
+  std::vector<std::string> words;
+  for (const CLI::App* next : ListCommands(command)) words.push_back(next->get_name());
+  const bool takes_scenario = std::ranges::any_of(command.get_options(), [](const CLI::Option* option) {
+    return option->get_positional() && option->get_name(true).find("SCENARIO") != std::string::npos;
   });
   if (takes_scenario) {
     const std::vector<std::string> scenarios = kScenarios.ListNames();
@@ -33,16 +38,32 @@ std::vector<std::string> ListNextWords(const CommandHelp& command) {
   return words;
 }
 
-std::vector<std::string> ListOptionNames(const CommandHelp& command) {
+std::vector<std::string> ListOptionNames(const CLI::App& command) {
   std::vector<std::string> names;
-  for (const OptionHelp& option : command.options) {
-    if (!option.is_positional) names.insert(names.end(), option.names.begin(), option.names.end());
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_positional()) continue;
+    for (const std::string& word : option->get_snames()) names.push_back("-" + word);
+    for (const std::string& word : option->get_lnames()) names.push_back("--" + word);
   }
   return names;
 }
 
+/// A command with its name, "study run", which is empty for the program itself.
+struct NamedCommand {
+  std::string name;
+  const CLI::App* command;
+};
+
+void AddNamed(const CLI::App& app, const std::string& name, std::vector<NamedCommand>* all) {
+  all->push_back({name, &app});
+  for (const CLI::App* command : ListCommands(app))
+    AddNamed(*command, (name.empty() ? "" : name + " ") + command->get_name(), all);
+}
+
 /// Words before the cursor choose the command; then its options, its commands, scenarios and files follow.
-std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
+std::string MakeBashCompletion(const CLI::App& app) {
+  std::vector<NamedCommand> commands;
+  AddNamed(app, "", &commands);
   std::string text =
       "# bash completion for dexcheck: put it into /usr/share/bash-completion/completions/dexcheck, or "
       "source it.\n"
@@ -51,18 +72,18 @@ std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
       "  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n"
       "    case \"$command $word\" in\n";
   // Each pattern of `case "$command $word"` adds a word to a command: "run" after "study" makes "study run".
-  for (const CommandHelp& command : commands) {
-    if (command.name.empty()) continue;
-    const size_t space = command.name.rfind(' ');
-    const std::string before = space == std::string::npos ? "" : command.name.substr(0, space);
-    const std::string last = space == std::string::npos ? command.name : command.name.substr(space + 1);
-    text += fmt::format("      '{} {}') command='{}' ;;\n", before, last, command.name);
+  for (const auto& [name, command] : commands) {
+    if (name.empty()) continue;
+    const size_t space = name.rfind(' ');
+    const std::string before = space == std::string::npos ? "" : name.substr(0, space);
+    const std::string last = space == std::string::npos ? name : name.substr(space + 1);
+    text += fmt::format("      '{} {}') command='{}' ;;\n", before, last, name);
   }
   text += "    esac\n  done\n  local words= files=\n  case $command in\n";
-  for (const CommandHelp& command : commands) {
-    text += fmt::format("    '{}') words='{}'; [[ $cur != -* ]] || words='{}'; files={} ;;\n", command.name,
-                        Join(ListNextWords(command), " "), Join(ListOptionNames(command), " "),
-                        command.commands.empty() || command.name.empty() ? "1" : "");
+  for (const auto& [name, command] : commands) {
+    text += fmt::format("    '{}') words='{}'; [[ $cur != -* ]] || words='{}'; files={} ;;\n", name,
+                        Join(ListNextWords(*command), " "), Join(ListOptionNames(*command), " "),
+                        ListCommands(*command).empty() || name.empty() ? "1" : "");
   }
   text +=
       "  esac\n"
@@ -77,20 +98,22 @@ std::string MakeBashCompletion(const std::vector<CommandHelp>& commands) {
 
 }  // namespace
 
-void AddHelpCommands(Command app, const CommandLine& line) {
-  Command completion =
-      app.AddCommand("completion", "Print completion for a shell, made from the help",
-                     {"dexcheck completion bash > ~/.local/share/bash-completion/completions/dexcheck",
-                      "source <(dexcheck completion bash)"});
+void AddHelpCommands(CLI::App* app) {
+  CLI::App* const completion =
+      AddCommand(app, "completion", "Print completion for a shell, made from the help",
+                 {"dexcheck completion bash > ~/.local/share/bash-completion/completions/dexcheck",
+                  "source <(dexcheck completion bash)"});
   const auto shell = std::make_shared<std::string>();
-  completion.AddOption("SHELL", shell.get(), "bash").Required().OneOf({"bash"});
-  completion.SetAction([&line, shell] {
-    fmt::print("{}", MakeBashCompletion(line.Describe()));
+  AddOption(completion, "SHELL", shell.get(), "bash")
+      ->required()
+      ->check(CLI::IsMember(std::vector<std::string>{"bash"}));
+  SetAction(completion, [app, shell] {
+    fmt::print("{}", MakeBashCompletion(*app));
     return kSuccess;
   });
-  Command version = app.AddCommand("version", "Print the versions of dexcheck and of its engine",
-                                   {"dexcheck version", "dexcheck version > versions.txt"});
-  version.SetAction([] {
+  CLI::App* const version = AddCommand(app, "version", "Print the versions of dexcheck and of its engine",
+                                       {"dexcheck version", "dexcheck version > versions.txt"});
+  SetAction(version, [] {
     fmt::print("dexcheck {}\nMuJoCo {} (compiled with the headers of {})\n", Version(),
                FormatRelease(mj_version()), FormatRelease(mjVERSION_HEADER));
     return kSuccess;

@@ -98,20 +98,22 @@ int Run(const ImportRequest& request) {
 
 }  // namespace
 
-void AddImportCommand(Command app) {
-  auto [command, request] = app.AddRequest<ImportRequest>(
-      "import", "Write a parameter file (TOML) from a URDF or an MJCF, to start from",
+void AddImportCommand(CLI::App* app) {
+  const auto [command, request] = AddRequest<ImportRequest>(
+      app, "import", "Write a parameter file (TOML) from a URDF or an MJCF, to start from",
       {"dexcheck import arm.urdf --out arm.toml", "dexcheck import newer.xml --downgrade --out arm.xml"});
-  command.AddOption("FILE", &request->source, "URDF or MJCF").Required();
-  command.AddOption("--out FILE.toml", &request->out, "File to write (- for standard output)").ShowDefault();
+  AddOption(command, "FILE", &request->source, "URDF or MJCF")->required();
+  AddOption(command, "--out FILE.toml", &request->out, "File to write (- for standard output)")
+      ->capture_default_str();
   AddUrdfOptions(command, &request->urdf);
-  command.AddFlag(
-      "--downgrade", &request->downgrade,
+  command->add_flag(
+      "--downgrade", request->downgrade,
       "Write an MJCF instead: a copy of a newer one for MuJoCo 2.2.2, without what has no effect on the "
       "dynamics");
-  command.AddFlag("--motors", &request->motors,
-                  "Write an MJCF instead: a copy with a torque motor for each joint, as run needs it, in the "
-                  "place of all actuators");
+  command->add_flag(
+      "--motors", request->motors,
+      "Write an MJCF instead: a copy with a torque motor for each joint, as run needs it, in the "
+      "place of all actuators");
   AddJsonOption(command, "what was read, and what was left out or changed", &request->json_file);
 }
 

@@ -224,21 +224,21 @@ int Run(const InitRequest& request) {
 
 }  // namespace
 
-void AddInitCommand(Command app) {
-  auto [command, request] = app.AddRequest<InitRequest>(
-      "init", "Make a folder to start from: parameters, MJCF with motors, a motion, a study of its gains, CI",
+void AddInitCommand(CLI::App* app) {
+  const auto [command, request] = AddRequest<InitRequest>(
+      app, "init",
+      "Make a folder to start from: parameters, MJCF with motors, a motion, a study of its gains, CI",
       {"dexcheck init arm.urdf arm.xml --out my_arm", "dexcheck init --from panda-reach"});
-  const Option robot =
-      command.AddOption("ROBOT", &request->robot, "URDF or MJCF of a robot").TypeName("FILE");
-  command
-      .AddOption("MJCF", &request->mjcf, "The same robot for the engine; made of a URDF when it is not given")
-      .TypeName("FILE");
-  command
-      .AddOption("--from SCENARIO", &request->from,
-                 "Copy a shipped scenario instead, with its robot (dexcheck run --list)")
-      .Excludes(robot);
-  command.AddOption("--out DIR", &request->out,
-                    "Folder to make; named after the robot or scenario by default");
+  CLI::Option* const robot =
+      AddOption(command, "ROBOT", &request->robot, "URDF or MJCF of a robot")->type_name("FILE");
+  AddOption(command, "MJCF", &request->mjcf,
+            "The same robot for the engine; made of a URDF when it is not given")
+      ->type_name("FILE");
+  AddOption(command, "--from SCENARIO", &request->from,
+            "Copy a shipped scenario instead, with its robot (dexcheck run --list)")
+      ->excludes(robot);
+  AddOption(command, "--out DIR", &request->out,
+            "Folder to make; named after the robot or scenario by default");
 }
 
 }  // namespace dexcheck::cli

@@ -284,28 +284,29 @@ int CompareTwoRecordings(const RecordingPair& pair) {
   return comparison.causes.empty() ? kSuccess : kDisagreement;
 }
 
-void AddJudgeCommand(Command app) {
-  auto [command, request] = app.AddRequest<JudgeRequest>(
-      "judge", "Say whether a model explains a recording of a robot, and what is missing",
+void AddJudgeCommand(CLI::App* app) {
+  const auto [command, request] = AddRequest<JudgeRequest>(
+      app, "judge", "Say whether a model explains a recording of a robot, and what is missing",
       {"dexcheck judge arm.urdf recording.csv --page judged.html",
        "dexcheck judge arm.urdf recording.csv --columns columns.toml"});
-  command.AddOption("MODEL", &request->model, "Parameter file, URDF or MJCF").Required();
-  command.AddOption(
-      "RECORDING", &request->recording,
+  AddOption(command, "MODEL", &request->model, "Parameter file, URDF or MJCF")->required();
+  AddOption(
+      command, "RECORDING", &request->recording,
       "CSV or text, MCAP, ROS 2 bag, HDF5, NumPy, a run's log, a file of columns that names files, or - "
       "for standard input");
-  command.AddOption("--recording FILE", &request->more, "A further recording of the same robot").Repeatable();
-  command.AddOption("--columns FILE.toml", &request->columns,
-                    "Which column is what; --describe writes one to start from");
-  command.AddFlag("--describe", &request->describe,
-                  "Print what the recording's columns are taken for, as a file of columns");
-  command.AddOption("--write FILE", &request->corrected,
-                    "Write a copy of MODEL in which what was found is put right");
+  AddOption(command, "--recording FILE", &request->more, "A further recording of the same robot")
+      ->allow_extra_args(false);
+  AddOption(command, "--columns FILE.toml", &request->columns,
+            "Which column is what; --describe writes one to start from");
+  command->add_flag("--describe", request->describe,
+                    "Print what the recording's columns are taken for, as a file of columns");
+  AddOption(command, "--write FILE", &request->corrected,
+            "Write a copy of MODEL in which what was found is put right");
   AddUrdfOptions(command, &request->urdf);
   AddJsonOption(command, "the judgement", &request->json_file);
-  command.AddOption("--page FILE.html", &request->page_file,
-                    "Write a page that loads nothing: torques, residuals, causes");
-  command.AddFlag("--quiet", &request->quiet, "No progress, and causes and verdict only");
+  AddOption(command, "--page FILE.html", &request->page_file,
+            "Write a page that loads nothing: torques, residuals, causes");
+  command->add_flag("--quiet", request->quiet, "No progress, and causes and verdict only");
 }
 
 }  // namespace dexcheck::cli

@@ -49,39 +49,46 @@ std::string JoinArguments(int argc, char** argv) {
   return text;
 }
 
-int RunCommandLine(int argc, char** argv) {
-  CommandLine line("dexcheck", "Validates analytic robot models and controllers against MuJoCo.", Version());
-  Command app = line.root();
-  app.RequireCommand();
+int RunProgram(int argc, char** argv) {
   const std::string typed = JoinArguments(argc, argv);
-  const Command comparing = app.Under("Compare descriptions");
-  AddConsistencyCommand(comparing);
-  AddDiagnoseCommand(comparing);
-  AddAuditCommand(comparing);
-  AddImportCommand(comparing);
-  AddEvalCommand(comparing);
-  AddEngineComparisonCommand(comparing);
-  const Command running = app.Under("Run and look");
-  AddRunCommand(running, typed);
-  AddReportCommand(running);
-  AddRenderCommand(running);
-  AddExportCommand(running);
-  AddCompareCommand(running);
-  AddJudgeCommand(running);
-  const Command studying = app.Under("Study");
-  AddStudyCommand(studying);
-  AddBudgetCommand(studying);
-  AddMutateCommand(studying);
-  AddExciteCommand(studying);
-  const Command setting_up = app.Under("Set up");
-  AddInitCommand(setting_up);
-  AddHelpCommands(setting_up, line);
-  return line.Run(argc, argv);
+  CLI::App app("Validates analytic robot models and controllers against MuJoCo.", "dexcheck");
+  app.formatter(MakeHelpFormatter());
+  app.set_version_flag("--version", Version());
+  app.footer("dexcheck A B, with two files of robots, is dexcheck consistency A B.");
+  app.require_subcommand(1);
+  // The commands since the last heading.
+  const auto group = [&](const std::string& heading) {
+    for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; }))
+      if (command->get_group() == "Subcommands") command->group(heading);
+  };
+  AddConsistencyCommand(&app);
+  AddDiagnoseCommand(&app);
+  AddAuditCommand(&app);
+  AddImportCommand(&app);
+  AddEvalCommand(&app);
+  AddEngineComparisonCommand(&app);
+  group("Compare descriptions");
+  AddRunCommand(&app, typed);
+  AddReportCommand(&app);
+  AddRenderCommand(&app);
+  AddExportCommand(&app);
+  AddCompareCommand(&app);
+  AddJudgeCommand(&app);
+  group("Run and look");
+  AddStudyCommand(&app);
+  AddBudgetCommand(&app);
+  AddMutateCommand(&app);
+  AddExciteCommand(&app);
+  group("Study");
+  AddInitCommand(&app);
+  AddHelpCommands(&app);
+  group("Set up");
+  return RunCommandLine(&app, argc, argv);
 }
 
 int Run(int argc, char** argv) {
   try {
-    const int exit_code = RunCommandLine(argc, argv);
+    const int exit_code = RunProgram(argc, argv);
     FlushOutput();
     return exit_code;
   } catch (const UsageError& error) {

@@ -235,66 +235,62 @@ int MutateRun(const MutateRequest& request) {
 
 }  // namespace
 
-void AddMutateCommand(Command app) {
+void AddMutateCommand(CLI::App* app) {
   const auto request = std::make_shared<MutateRequest>();
-  Command command = app.AddCommand(
-      "mutate", "Change every number and equation of the model on purpose: which faults are found and named?",
+  CLI::App* command = AddCommand(
+      app, "mutate",
+      "Change every number and equation of the model on purpose: which faults are found and named?",
       {"dexcheck mutate arm.toml arm.xml", "dexcheck mutate panda-reach --draws 20 --page faults.html"});
   AddFileOptions(
       command,
       "Scenario whose run gets the faults: numbers, equations, laws, plants; with B a parameter file",
       "The same robot for the engine; without both, the shipped pair", &request->files);
-  command.AddOption("--scale X", &request->options.scale, "Change of a number, relative to it")
-      .Check(NumberFrom(1e-9, 0.5))
-      .ShowDefault();
+  AddOption(command, "--scale X", &request->options.scale, "Change of a number, relative to it")
+      ->check(NumberFrom(1e-9, 0.5))
+      ->capture_default_str();
   AddOverrideOptions(command, &request->overrides);
-  command
-      .AddOption("--from T", &request->run.from,
-                 "In a run: when the fault begins, s; in a motion of joints it is there from the first")
-      .Check(NumberFrom(0.0, 1e4))
-      .ShowDefault();
-  command
-      .AddOption("--duration T", &request->duration,
-                 "In a run: how long it is looked at, s (default 0.1; faults that are drawn "
-                 "in a motion of joints, or not found, are looked at to its end)")
-      .Check(NumberFrom(1e-3, 1e4));
-  command
-      .AddOption("--numbers N", &request->run.parameters,
-                 "In a run: how many numbers of the model are changed, evenly out of all")
-      .Check(WholeNumber(0, 100000))
-      .ShowDefault();
-  const Option draws = command
-                           .AddOption("--draws N", &request->run.draws,
-                                      "In a run: sets of faults whose places, sizes and times are drawn, and "
-                                      "whether they are named, in the place of the others")
-                           .Check(WholeNumber(1, 100000));
-  command.AddOption("--together N", &request->run.together, "With --draws: faults at once")
-      .Check(WholeNumber(1, 5))
-      .Needs(draws)
-      .ShowDefault();
-  command.AddOption("--draw-seed N", &request->run.seed, "In a run: what is drawn")
-      .Check(WholeNumber(0, 1000000))
-      .ShowDefault();
-  command
-      .AddOption(
-          "--kinds KIND,...", &request->run.kinds,
-          "In a run: out of which kinds of faults is drawn: motor, sensor, joint, body, floor, wheels, "
-          "contact, solver, law (default: all)")
-      .Delimiter(',');
+  AddOption(command, "--from T", &request->run.from,
+            "In a run: when the fault begins, s; in a motion of joints it is there from the first")
+      ->check(NumberFrom(0.0, 1e4))
+      ->capture_default_str();
+  AddOption(command, "--duration T", &request->duration,
+            "In a run: how long it is looked at, s (default 0.1; faults that are drawn "
+            "in a motion of joints, or not found, are looked at to its end)")
+      ->check(NumberFrom(1e-3, 1e4));
+  AddOption(command, "--numbers N", &request->run.parameters,
+            "In a run: how many numbers of the model are changed, evenly out of all")
+      ->check(WholeNumber(0, 100000))
+      ->capture_default_str();
+  CLI::Option* const draws =
+      AddOption(command, "--draws N", &request->run.draws,
+                "In a run: sets of faults whose places, sizes and times are drawn, and "
+                "whether they are named, in the place of the others")
+          ->check(WholeNumber(1, 100000));
+  AddOption(command, "--together N", &request->run.together, "With --draws: faults at once")
+      ->check(WholeNumber(1, 5))
+      ->needs(draws)
+      ->capture_default_str();
+  AddOption(command, "--draw-seed N", &request->run.seed, "In a run: what is drawn")
+      ->check(WholeNumber(0, 1000000))
+      ->capture_default_str();
+  AddOption(command, "--kinds KIND,...", &request->run.kinds,
+            "In a run: out of which kinds of faults is drawn: motor, sensor, joint, body, floor, wheels, "
+            "contact, solver, law (default: all)")
+      ->delimiter(',');
   AddSampleOptions(command, 1000, &request->options.samples, &request->options.seed);
-  command.AddFlag("--no-diagnosis", &request->no_diagnosis, "Only whether each is found, not what is named");
-  command.AddOption("--page FILE.html", &request->page_file,
-                    "In a run: an HTML page with what was made, what was found, and how it was named");
+  command->add_flag("--no-diagnosis", request->no_diagnosis, "Only whether each is found, not what is named");
+  AddOption(command, "--page FILE.html", &request->page_file,
+            "In a run: an HTML page with what was made, what was found, and how it was named");
   AddJobsOption(command, "Faults", &request->jobs);
   AddJsonOption(command, "the results, from which an interrupted campaign goes on,", &request->json_file);
-  command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
-  command.SetAction([=] {
+  command->add_flag("--quiet", request->quiet, "Print the verdict only");
+  SetAction(command, [=] {
     constexpr std::array kOfFiles = {"--samples", "--seed", "--no-diagnosis"};
     constexpr std::array kOfRuns = {"--set",     "--unset", "--controller", "--from",  "--duration",
                                     "--numbers", "--draws", "--draw-seed",  "--kinds", "--page"};
-    const bool has_first = command.is_given("--robot"), in_run = has_first && !command.is_given("--mjcf");
+    const bool has_first = command->count("--robot"), in_run = has_first && !command->count("--mjcf");
     for (const char* option : in_run ? std::span<const char* const>(kOfFiles) : kOfRuns) {
-      if (command.is_given(option))
+      if (command->count(option))
         throw UsageError(std::string("mutate: ") + option +
                          (in_run ? " is of two files, got the scenario " : " is of a scenario's run, got ") +
                          (in_run      ? request->files.robot.string()

@@ -142,26 +142,26 @@ ExitCode Run(RenderRequest request) {
 
 }  // namespace
 
-void AddRenderCommand(Command app) {
+void AddRenderCommand(CLI::App* app) {
   constexpr int kMostFramesPerSecond = 120;
-  auto [command, request] = app.AddRequest<RenderRequest>(
-      "render", "Draw a recorded run as a video, or one instant of it",
+  const auto [command, request] = AddRequest<RenderRequest>(
+      app, "render", "Draw a recorded run as a video, or one instant of it",
       {"dexcheck render my_run --camera follow", "dexcheck render my_run --still 2.5 --out still.png"});
-  command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
-  command.AddOption("--out FILE", &request->out,
-                    "A video .mp4, or a picture .png (default: video.mp4 or still.png in RUN_DIR)");
-  command.AddOption("--still T", &request->still, "One picture at this time of the run, s");
-  command.AddOption("--camera NAME", &request->video.camera,
-                    "overview (the default), follow, grasp, top, or another of the MJCF's; robot and object "
-                    "are near to those; course stands still and sees the whole way");
-  command.AddOption("--inset NAME", &request->video.inset, "A second camera in the lower right corner");
-  command.AddOption("--size WxH", &request->size, "Size of the picture in pixels").ShowDefault();
-  command.AddOption("--fps N", &request->video.fps, "Frames a second")
-      .Check(WholeNumber(1, kMostFramesPerSecond))
-      .ShowDefault();
-  command.AddFlag("--forces", &request->video.forces, "Draw contact forces and friction cones");
-  command.AddFlag("--no-panel", &request->no_panel, "Leave out the panel with time, errors and checks");
-  command.AddFlag("--quiet", &request->quiet, "Print nothing");
+  AddOption(command, "RUN_DIR", &request->run_folder, "Folder of the run")->required()->type_name("");
+  AddOption(command, "--out FILE", &request->out,
+            "A video .mp4, or a picture .png (default: video.mp4 or still.png in RUN_DIR)");
+  AddOption(command, "--still T", &request->still, "One picture at this time of the run, s");
+  AddOption(command, "--camera NAME", &request->video.camera,
+            "overview (the default), follow, grasp, top, or another of the MJCF's; robot and object "
+            "are near to those; course stands still and sees the whole way");
+  AddOption(command, "--inset NAME", &request->video.inset, "A second camera in the lower right corner");
+  AddOption(command, "--size WxH", &request->size, "Size of the picture in pixels")->capture_default_str();
+  AddOption(command, "--fps N", &request->video.fps, "Frames a second")
+      ->check(WholeNumber(1, kMostFramesPerSecond))
+      ->capture_default_str();
+  command->add_flag("--forces", request->video.forces, "Draw contact forces and friction cones");
+  command->add_flag("--no-panel", request->no_panel, "Leave out the panel with time, errors and checks");
+  command->add_flag("--quiet", request->quiet, "Print nothing");
   AddJsonOption(command, "what was drawn", &request->json_file);
 }
 

@@ -46,18 +46,18 @@ int Run(const ReportRequest& request) {
 
 }  // namespace
 
-void AddReportCommand(Command app) {
-  auto [command, request] =
-      app.AddRequest<ReportRequest>("report", "Write a recorded run's report: one page and its figures",
-                                    {"dexcheck report my_run", "dexcheck report my_run --tex results.tex"});
-  command.AddOption("RUN_DIR", &request->run_folder, "Folder of the run").Required().TypeName("");
-  command.AddOption("--page FILE.html", &request->out,
-                    "Write only the page, here (default: report.html and figures/ in RUN_DIR)");
-  command.AddFlag("--no-replay", &request->no_replay, "Leave out the replay in three dimensions");
-  command.AddFlag("--quiet", &request->quiet, "Print nothing");
+void AddReportCommand(CLI::App* app) {
+  const auto [command, request] =
+      AddRequest<ReportRequest>(app, "report", "Write a recorded run's report: one page and its figures",
+                                {"dexcheck report my_run", "dexcheck report my_run --tex results.tex"});
+  AddOption(command, "RUN_DIR", &request->run_folder, "Folder of the run")->required()->type_name("");
+  AddOption(command, "--page FILE.html", &request->out,
+            "Write only the page, here (default: report.html and figures/ in RUN_DIR)");
+  command->add_flag("--no-replay", request->no_replay, "Leave out the replay in three dimensions");
+  command->add_flag("--quiet", request->quiet, "Print nothing");
   AddJsonOption(command, "where page and figures are", &request->json_file);
-  command.AddOption(
-      "--tex FILE.tex", &request->tex_file,
+  AddOption(
+      command, "--tex FILE.tex", &request->tex_file,
       "Write a table of results for LaTeX, too, with the commit and the command (- for standard output)");
 }
 

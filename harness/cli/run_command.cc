@@ -253,47 +253,49 @@ int Run(const RunRequest& request) {
 
 }  // namespace
 
-void AddRunCommand(Command app, const std::string& command_line) {
-  auto [command, request] = app.AddRequest<RunRequest>(
-      "run", "Simulate a scenario, cross-checked at every step",
+void AddRunCommand(CLI::App* app, const std::string& command_line) {
+  const auto [command, request] = AddRequest<RunRequest>(
+      app, "run", "Simulate a scenario, cross-checked at every step",
       {"dexcheck run paper --out my_run", "dexcheck run motion.toml --controller law.py"});
   request->command = command_line;
-  Option scenario = command.AddOption("SCENARIO", &request->scenario,
-                                      "Name of a shipped scenario (--list), or a TOML file");
-  Option list = command.AddFlag("--list", &request->list, "List the shipped scenarios");
-  Option replay = command.AddOption("--replay RUN_DIR", &request->replay,
-                                    "Repeat a recorded run and compare every number bit for bit");
-  Option out = command.AddOption("--out DIR", &request->out,
-                                 "Folder for the results, made by the run (runs/SCENARIO by default)");
+  CLI::Option* const scenario = AddOption(command, "SCENARIO", &request->scenario,
+                                          "Name of a shipped scenario (--list), or a TOML file");
+  CLI::Option* const list = command->add_flag("--list", request->list, "List the shipped scenarios");
+  CLI::Option* const replay = AddOption(command, "--replay RUN_DIR", &request->replay,
+                                        "Repeat a recorded run and compare every number bit for bit");
+  CLI::Option* const out = AddOption(command, "--out DIR", &request->out,
+                                     "Folder for the results, made by the run (runs/SCENARIO by default)");
   const auto [set, unset, controller] = AddOverrideOptions(command, &request->overrides);
-  const std::array<Option, 2> judging = AddToleranceOptions(command, &request->judging);
-  Option seed = AddSeedOption(command, &request->seed);
-  command
-      .AddOption(
-          "--threads N", &request->threads,
-          "2 (where there are two processors): checks have a thread of their own; the numbers are the same")
-      .Check(WholeNumber(1, 2));
-  Option no_check = command.AddFlag("--no-check", &request->no_check, "Simulate without cross-checks");
-  Option video = command.AddFlag("--video", &request->video, "Draw the run as a video, video.mp4");
-  Option no_report =
-      command.AddFlag("--no-report", &request->no_report, "Write the log and the summary only");
-  Option junit = AddJUnitOption(command, &request->junit_file);
-  Option no_log = command.AddFlag("--no-log", &request->no_log, "Write no files");
-  Option quiet = command.AddFlag("--quiet", &request->quiet, "Print the verdict only");
-  Option gains = command.AddFlag(
-      "--gains", &request->gains,
+  const std::array<CLI::Option*, 2> judging = AddToleranceOptions(command, &request->judging);
+  CLI::Option* const seed = AddSeedOption(command, &request->seed);
+  AddOption(command, "--threads N", &request->threads,
+            "2 (where there are two processors): checks have a thread of their own; the numbers are the same")
+      ->check(WholeNumber(1, 2));
+  CLI::Option* const no_check =
+      command->add_flag("--no-check", request->no_check, "Simulate without cross-checks");
+  CLI::Option* const video =
+      command->add_flag("--video", request->video, "Draw the run as a video, video.mp4");
+  CLI::Option* const no_report =
+      command->add_flag("--no-report", request->no_report, "Write the log and the summary only");
+  CLI::Option* const junit = AddJUnitOption(command, &request->junit_file);
+  CLI::Option* const no_log = command->add_flag("--no-log", request->no_log, "Write no files");
+  CLI::Option* const quiet = command->add_flag("--quiet", request->quiet, "Print the verdict only");
+  CLI::Option* const gains = command->add_flag(
+      "--gains", request->gains,
       "Print a joint motion's gains, its stability margins and the fastest gains with enough of them");
-  Option all = command.AddFlag("--all", &request->all, "Print each check, not only a line for each category");
-  Option json = AddJsonOption(command, "the summary", &request->json_file);
-  Option(controller).Excludes(list);
-  scenario.Excludes(list).Excludes(replay);
-  list.Excludes(replay);
+  CLI::Option* const all =
+      command->add_flag("--all", request->all, "Print each check, not only a line for each category");
+  CLI::Option* const json = AddJsonOption(command, "the summary", &request->json_file);
+  controller->excludes(list);
+  scenario->excludes(list)->excludes(replay);
+  list->excludes(replay);
   // Options that would be ignored are refused.
-  for (Option option : judging) option.Excludes(list).Excludes(replay);
-  no_log.Excludes(video).Excludes(out);
-  all.Excludes(quiet);
-  for (Option option : {out, set, unset, seed, no_check, video, no_report, no_log, junit, all, gains, json}) {
-    option.Excludes(replay).Excludes(list);
+  for (CLI::Option* option : judging) option->excludes(list)->excludes(replay);
+  no_log->excludes(video)->excludes(out);
+  all->excludes(quiet);
+  for (CLI::Option* option :
+       {out, set, unset, seed, no_check, video, no_report, no_log, junit, all, gains, json}) {
+    option->excludes(replay)->excludes(list);
   }
 }
 

@@ -263,66 +263,64 @@ int MergeStudies(const std::string& out, const std::vector<std::string>& databas
 
 }  // namespace
 
-void AddStudyCommand(Command app) {
-  Command study =
-      app.AddCommand("study", "Vary a scenario's gains, models or plant over many runs",
-                     {"dexcheck study run gains --db gains.sqlite", "dexcheck study report gains.sqlite"});
-  study.RequireCommand();
+void AddStudyCommand(CLI::App* app) {
+  CLI::App* study =
+      AddCommand(app, "study", "Vary a scenario's gains, models or plant over many runs",
+                 {"dexcheck study run gains --db gains.sqlite", "dexcheck study report gains.sqlite"});
+  study->require_subcommand(1);
   const auto request = std::make_shared<StudyRequest>();
   const auto databases = std::make_shared<std::vector<std::string>>();
   const auto whole = WholeNumber(1, 1000000);
-  const auto add_quiet = [&](Command command) {
-    command.AddFlag("--quiet", &request->quiet, "Print nothing but errors");
+  const auto add_quiet = [&](CLI::App* command) {
+    command->add_flag("--quiet", request->quiet, "Print nothing but errors");
   };
 
-  Command run = study.AddCommand("run", "Make the trials that are missing in the database",
-                                 {"dexcheck study run gains --db gains.sqlite",
-                                  "dexcheck study run my_study.toml --db part.sqlite --shard 1/4"});
-  run.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
-  run.AddOption("--db FILE.sqlite", &request->database,
-                "The study's database (SQLite), made when there is none")
-      .Required();
+  CLI::App* const run = AddCommand(study, "run", "Make the trials that are missing in the database",
+                                   {"dexcheck study run gains --db gains.sqlite",
+                                    "dexcheck study run my_study.toml --db part.sqlite --shard 1/4"});
+  AddOption(run, "STUDY", &request->study, "Name of a shipped study, or a TOML file")->required();
+  AddOption(run, "--db FILE.sqlite", &request->database,
+            "The study's database (SQLite), made when there is none")
+      ->required();
   AddControllerOptions(run, &request->controller);
   AddJobsOption(run, "Trials", &request->jobs);
-  run.AddOption("--shard I/N", &request->shard, "Only the I-th of N parts of the study");
-  run.AddFlag("--retry-failed", &request->retry_failed, "Make trials again that crashed or timed out");
+  AddOption(run, "--shard I/N", &request->shard, "Only the I-th of N parts of the study");
+  run->add_flag("--retry-failed", request->retry_failed, "Make trials again that crashed or timed out");
   add_quiet(run);
-  run.SetAction([=] { return RunStudy(*request); });
+  SetAction(run, [=] { return RunStudy(*request); });
 
-  Command merge = study.AddCommand("merge", "Put the databases of one study together",
-                                   {"dexcheck study merge all.sqlite part1.sqlite part2.sqlite",
-                                    "dexcheck study merge all.sqlite part1.sqlite --quiet"});
-  merge.AddOption("OUT", &request->database, "Database that gets all trials").Required();
-  merge.AddOption("DB", databases.get(), "Databases of the same study").Required();
+  CLI::App* const merge = AddCommand(study, "merge", "Put the databases of one study together",
+                                     {"dexcheck study merge all.sqlite part1.sqlite part2.sqlite",
+                                      "dexcheck study merge all.sqlite part1.sqlite --quiet"});
+  AddOption(merge, "OUT", &request->database, "Database that gets all trials")->required();
+  AddOption(merge, "DB", databases.get(), "Databases of the same study")->required();
   add_quiet(merge);
-  merge.SetAction([=] { return MergeStudies(request->database, *databases, request->quiet); });
+  SetAction(merge, [=] { return MergeStudies(request->database, *databases, request->quiet); });
 
   AddStudyReadCommands(study);
 
-  Command slurm = study.AddCommand("slurm", "Print an array job for Slurm that makes the study",
-                                   {"dexcheck study slurm gains --tasks 16",
-                                    "dexcheck study slurm my_study.toml --tasks 16 --time 01:00:00"});
-  slurm.AddOption("STUDY", &request->study, "Name of a shipped study, or a TOML file").Required();
+  CLI::App* const slurm = AddCommand(study, "slurm", "Print an array job for Slurm that makes the study",
+                                     {"dexcheck study slurm gains --tasks 16",
+                                      "dexcheck study slurm my_study.toml --tasks 16 --time 01:00:00"});
+  AddOption(slurm, "STUDY", &request->study, "Name of a shipped study, or a TOML file")->required();
   const auto job = std::make_shared<SlurmJob>();
   AddControllerOptions(slurm, &request->controller);
-  slurm.AddOption("--tasks N", &job->tasks, "Parts of the study, each with a database of its own")
-      .Required()
-      .Check(whole);
-  slurm
-      .AddOption("--array-size N", &job->array_size,
-                 "Most elements of the array (1000, as Slurm's MaxArraySize of 1001 allows); of more parts "
-                 "each makes several")
-      .Check(whole);
-  slurm.AddOption("--cpus N", &job->cpus, "Processors of an element (1)").Check(whole);
-  slurm.AddOption("--throttle N", &job->throttle, "Elements that run at a time").Check(whole);
-  slurm
-      .AddOption("--time TIME", &job->time,
-                 "Time limit of an element: MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]]")
-      .Check(SlurmValue("\\d{1,9}(-\\d{1,9})?(:\\d{1,9}){0,2}",
-                        "must be MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]]"));
-  slurm.AddOption("--memory SIZE", &job->memory, "Memory of an element, as 500M or 2G")
-      .Check(SlurmValue("\\d{1,9}[KMGT]?", "must be a whole number with K, M, G or T"));
-  slurm.SetAction([=] {
+  AddOption(slurm, "--tasks N", &job->tasks, "Parts of the study, each with a database of its own")
+      ->required()
+      ->check(whole);
+  AddOption(slurm, "--array-size N", &job->array_size,
+            "Most elements of the array (1000, as Slurm's MaxArraySize of 1001 allows); of more parts "
+            "each makes several")
+      ->check(whole);
+  AddOption(slurm, "--cpus N", &job->cpus, "Processors of an element (1)")->check(whole);
+  AddOption(slurm, "--throttle N", &job->throttle, "Elements that run at a time")->check(whole);
+  AddOption(slurm, "--time TIME", &job->time,
+            "Time limit of an element: MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]]")
+      ->check(SlurmValue("\\d{1,9}(-\\d{1,9})?(:\\d{1,9}){0,2}",
+                         "must be MIN, MIN:SEC, HOURS:MIN:SEC or DAYS-HOURS[:MIN[:SEC]]"));
+  AddOption(slurm, "--memory SIZE", &job->memory, "Memory of an element, as 500M or 2G")
+      ->check(SlurmValue("\\d{1,9}[KMGT]?", "must be a whole number with K, M, G or T"));
+  SetAction(slurm, [=] {
     StudyInputs inputs = FindStudy(request->study, request->controller);
     if (inputs.study.is_search() && job->tasks > 1)
       throw InputError("--tasks: the trials of a search follow from one another: it is one task");

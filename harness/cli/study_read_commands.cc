@@ -47,21 +47,21 @@ int ShowTrial(const std::string& database, long number, const std::string& json)
 
 }  // namespace
 
-void AddStudyReadCommands(Command study) {
+void AddStudyReadCommands(CLI::App* study) {
   const auto database = std::make_shared<std::string>();
   const auto out = std::make_shared<std::string>();
-  const auto add_database = [&](Command command) {
-    command.AddOption("DB", database.get(), "The study's database").Required();
+  const auto add_database = [&](CLI::App* command) {
+    AddOption(command, "DB", database.get(), "The study's database")->required();
   };
 
-  Command report = study.AddCommand(
-      "report", "Write an HTML page of a study's results",
+  CLI::App* const report = AddCommand(
+      study, "report", "Write an HTML page of a study's results",
       {"dexcheck study report gains.sqlite", "dexcheck study report gains.sqlite --page gains.html"});
   add_database(report);
-  report.AddOption("--page FILE.html", out.get(), "The page (DB.html by default); - for standard output");
+  AddOption(report, "--page FILE.html", out.get(), "The page (DB.html by default); - for standard output");
   const auto json = std::make_shared<std::string>();
   AddJsonOption(report, "the same data", json.get());
-  report.SetAction([=] {
+  SetAction(report, [=] {
     RequirePageName(*out);
     const StudySummary summary = SummariseStudy(StudyStore::Open(*database));
     WriteJson(*json, summary.json);
@@ -70,21 +70,21 @@ void AddStudyReadCommands(Command study) {
     return kSuccess;
   });
 
-  Command show = study.AddCommand(
-      "show", "Print one trial and the command that repeats it",
+  CLI::App* const show = AddCommand(
+      study, "show", "Print one trial and the command that repeats it",
       {"dexcheck study show gains.sqlite 3", "dexcheck study show gains.sqlite 3 --json trial.json"});
   add_database(show);
   const auto number = std::make_shared<long>(0);
-  show.AddOption("TRIAL", number.get(), "Number of the trial").Required();
+  AddOption(show, "TRIAL", number.get(), "Number of the trial")->required();
   AddJsonOption(show, "the trial", json.get());
-  show.SetAction([=] { return ShowTrial(*database, *number, *json); });
+  SetAction(show, [=] { return ShowTrial(*database, *number, *json); });
 
-  Command csv = study.AddCommand(
-      "export", "Write all trials as CSV",
+  CLI::App* const csv = AddCommand(
+      study, "export", "Write all trials as CSV",
       {"dexcheck study export gains.sqlite", "dexcheck study export gains.sqlite --out gains.csv"});
   add_database(csv);
-  csv.AddOption("--out FILE.csv", out.get(), "The file (DB.csv by default); - for standard output");
-  csv.SetAction([=] {
+  AddOption(csv, "--out FILE.csv", out.get(), "The file (DB.csv by default); - for standard output");
+  SetAction(csv, [=] {
     const StudyStore store = StudyStore::Open(*database);
     OutputFile file(out->empty() ? *database + ".csv" : *out);
     WriteStudyCsv(store, [&](std::string_view text) { file.Append(std::string(text)); });
