@@ -9,7 +9,6 @@
 #include <string>
 
 #include "controller/common/types.h"
-#include "renders/decoration.h"
 #include "renders/image.h"
 
 // Cairo chose these names.

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 namespace dexcheck {
+
+/// Red, green, blue, opacity, each from 0 to 1.
+using Color = std::array<float, 4>;
 
 /// RGB picture, 8 bits a channel, rows from top to bottom without padding.
 struct Image {

@@ -6,10 +6,10 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "controller/common/types.h"
-#include "renders/decoration.h"
 #include "renders/image.h"
 #include "renders/offscreen_context.h"
 #include "renders/viewpoint.h"
@@ -18,6 +18,27 @@ namespace dexcheck {
 
 /// A camera that stands still where RenderOptions::course says; an MJCF's camera of this name comes first.
 inline constexpr const char* kCourseCamera = "course";
+
+// Decorations: shapes drawn into the scene besides the model's own geoms. Points in world coordinates, m.
+
+/// A force or another vector.
+struct Arrow {
+  Vector3d from;
+  Vector3d to;
+  double radius;  ///< Of the shaft, m.
+  Color color;
+};
+
+/// The forces that Coulomb friction allows: a cone that opens from its apex along its axis.
+struct Cone {
+  Vector3d apex;
+  Vector3d axis;      ///< Unit vector.
+  double height;      ///< m.
+  double half_angle;  ///< rad, atan(mu).
+  Color color;
+};
+
+using Decoration = std::variant<Arrow, Cone>;
 
 struct RenderOptions {
   int width = 1280;

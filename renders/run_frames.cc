@@ -58,6 +58,29 @@ void CheckRunFrames(const mjModel& model, const RunFrames& run) {
   check_matrix("desired angles", run.desired_angles, 3);
 }
 
+void SetRow(const mjModel& model, const RunFrames& run, long row, mjData* data) {
+  mju_copy(data->qpos, run.qpos.row(row).data(), static_cast<int>(model.nq));
+  mj_kinematics(&model, data);
+  mj_comPos(&model, data);
+  mj_camlight(&model, data);
+}
+
+Vector3d ContactVector(const RowMatrixXd& rows, long row, long contact) {
+  return rows.block<1, 3>(row, 3 * contact).transpose();
+}
+
+double CalcMetersPerNewton(const RunFrames& run) {
+  constexpr double kLongestForce = 0.042;  // m, suits a hand
+  double largest = 0.0;
+  for (long row = 0; row < run.contact_forces.rows(); ++row) {
+    for (long k = 0; k < run.contact_forces.cols() / 3; ++k) {
+      const double size = ContactVector(run.contact_forces, row, k).norm();
+      if (std::isfinite(size)) largest = std::max(largest, size);
+    }
+  }
+  return largest > 0.0 ? kLongestForce / largest : 1.0;
+}
+
 CheckHistory::CheckHistory(const RunFrames& run) : run_(run) {
   for (const CheckSeries& check : run.checks) {
     std::vector<double>& worst = worst_.emplace_back();

@@ -53,6 +53,16 @@ struct RunFrames {
 /// model and is finite, times increase, and the run lasts longer than an instant.
 void CheckRunFrames(const mjModel& model, const RunFrames& run);
 
+/// Puts a row of a run into `data` and computes what drawing needs.
+void SetRow(const mjModel& model, const RunFrames& run, long row, mjData* data);
+
+/// A row of contact_positions, contact_forces or contact_normals, at one contact.
+Vector3d ContactVector(const RowMatrixXd& rows, long row, long contact);
+
+/// How long the arrow of 1 N is drawn: the run's largest contact force fits beside a hand. 1 when there is
+/// none.
+double CalcMetersPerNewton(const RunFrames& run);
+
 /// Worst residuals up to each row, so that a video can show at any time which check stands worst.
 class CheckHistory {
  public:

@@ -12,7 +12,6 @@
 #include "renders/canvas.h"
 #include "renders/overlay.h"
 #include "renders/renderer.h"
-#include "renders/run_decorations.h"
 #include "renders/viewpoint.h"
 
 namespace dexcheck {
@@ -45,6 +44,40 @@ std::array<double, 2> ErrorRange(const std::vector<double>& errors) {
   low = std::pow(10.0, std::floor(std::log10(low)));
   constexpr double kMostDecades = 1e6;
   return {std::max(low, high / kMostDecades), high};
+}
+
+const Color kForce = MakeColor(0xe0102e);
+const Color kCone = MakeColor(0x2fb7ff, 0.30F);
+
+// Sizes that suit a hand, m.
+constexpr double kConeHeight = 0.026;
+constexpr double kForceRadius = 0.0018;
+
+/// The contact forces of a row, each in its friction cone. @param meters_per_newton as CalcMetersPerNewton
+/// has it.
+std::vector<Decoration> MakeForces(const RunFrames& run, long row, double meters_per_newton) {
+  std::vector<Decoration> decorations;
+  if (run.contact_forces.size() == 0) return decorations;
+  for (long k = 0; k < run.contacts(); ++k) {
+    const Vector3d p = ContactVector(run.contact_positions, row, k);
+    const Vector3d force = ContactVector(run.contact_forces, row, k);
+    if (!p.allFinite() || !force.allFinite() || force.isZero()) continue;
+    decorations.emplace_back(Arrow{p, p + meters_per_newton * force, kForceRadius, kForce});
+    if (run.contact_normals.size() == 0 || !(run.friction > 0.0)) continue;
+    const Vector3d normal = ContactVector(run.contact_normals, row, k);
+    if (!normal.allFinite() || normal.isZero()) continue;
+    decorations.emplace_back(Cone{p, normal.normalized(), kConeHeight, std::atan(run.friction), kCone});
+  }
+  return decorations;
+}
+
+/// The key to their colours.
+std::vector<LegendEntry> MakeForceLegend(const RunFrames& run) {
+  std::vector<LegendEntry> legend;
+  if (run.contact_forces.size() == 0) return legend;
+  legend.push_back({"force on the object", kForce});
+  if (run.friction > 0.0) legend.push_back({"friction cone", {kCone[0], kCone[1], kCone[2], 1.0F}});
+  return legend;
 }
 
 }  // namespace

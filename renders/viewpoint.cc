@@ -7,7 +7,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/map_vector.h"
-#include "renders/run_decorations.h"
+#include "renders/run_frames.h"
 
 namespace dexcheck {
 

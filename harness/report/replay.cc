@@ -10,7 +10,7 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "renders/renderer.h"
-#include "renders/run_decorations.h"
+#include "renders/run_frames.h"
 #include "renders/viewpoint.h"
 
 namespace dexcheck {

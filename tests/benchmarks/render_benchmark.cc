@@ -16,7 +16,7 @@
 #include "harness/engine/engine.h"
 #include "renders/offscreen_context.h"
 #include "renders/renderer.h"
-#include "renders/run_decorations.h"
+#include "renders/run_frames.h"
 #include "renders/video.h"
 #include "tests/benchmarks/measured_time.h"
 #include "tests/common/files.h"

@@ -5,7 +5,7 @@
 
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
-#include "renders/run_decorations.h"
+#include "renders/run_frames.h"
 
 namespace dexcheck::testing {
 namespace {

@@ -10,7 +10,7 @@
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
-#include "renders/run_decorations.h"
+#include "renders/run_frames.h"
 #include "renders/video.h"
 #include "renders/video_writer.h"
 #include "tests/common/paths.h"

@@ -8,7 +8,7 @@
 
 #include "harness/report/page.h"
 #include "renders/renderer.h"
-#include "renders/run_decorations.h"
+#include "renders/run_frames.h"
 #include "renders/video_writer.h"
 #include "tests/common/browser.h"
 #include "tests/common/matchers.h"
