@@ -79,24 +79,6 @@ bool IsAt(const Value& value, const Value& rest) {
   return value == rest;
 }
 
-/// Makes setups of one scenario with other imperfections; the scene is compiled once.
-class SetupMaker {
- public:
-  SetupMaker(const Scenario& scenario, std::filesystem::path robot, std::filesystem::path mjcf)
-      : scenario_(scenario), robot_(std::move(robot)), mjcf_(std::move(mjcf)), engine_(LoadMjcf(mjcf_)) {}
-
-  [[nodiscard]] std::unique_ptr<Setup> Make(const Imperfections& imperfections) const {
-    Scenario scenario = scenario_;
-    scenario.imperfections = imperfections;
-    return std::make_unique<Setup>(scenario, robot_, mjcf_, MjModelPtr(mj_copyModel(nullptr, engine_.get())));
-  }
-
- private:
-  Scenario scenario_;
-  std::filesystem::path robot_, mjcf_;
-  MjModelPtr engine_;
-};
-
 /// Unit of the joints' errors.
 std::string NameUnit(const RobotModel& model) {
   const bool slides = std::ranges::any_of(
@@ -201,18 +183,18 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
                      ": has nothing in [sensing], [actuation], [[disturbance]] or "
                      "[mismatch] that could cost accuracy");
   }
-  const SetupMaker maker(scenario, robot, mjcf);
+  const MjModelPtr engine = LoadMjcf(mjcf);  // compiled once
   const auto from = static_cast<size_t>(std::lround(scenario.expect.from / scenario.plant.time_step));
   ErrorBudget budget;
   budget.scenario = scenario.name;
   budget.of_joints = scenario.joint_task() != nullptr;
   const auto size_of = [&](const Errors& errors) { return CalcSize(errors, from, budget.of_joints); };
   const auto without = [&](const std::function<bool(size_t)>& dropped) {
-    Imperfections kept = scenario.imperfections;
+    Scenario kept = scenario;
     for (size_t i = 0; i < sources.size(); ++i) {
-      if (dropped(i)) sources[i].drop(&kept);
+      if (dropped(i)) sources[i].drop(&kept.imperfections);
     }
-    return maker.Make(kept);
+    return std::make_unique<Setup>(kept, robot, mjcf, MjModelPtr(mj_copyModel(nullptr, engine.get())));
   };
   // Made here, so that a fault of the scenario is an input error.
   const std::unique_ptr<Setup> ideal_setup = without([](size_t) { return true; });
