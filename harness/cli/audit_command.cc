@@ -8,8 +8,6 @@
 
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/json_matrix.h"
-#include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/descriptions/audit.h"
@@ -99,12 +97,11 @@ std::string WriteAuditJUnit(const AuditRequest& request, const AuditResult& resu
 
 int Run(const AuditRequest& request) {
   const RobotDescription robot = ReadDescription(request.robot, request.urdf);
-  ResultFile json(request.json_file);
-  ResultFile junit(request.junit_file);
+  OutputFile json(request.json_file), junit(request.junit_file);
   const AuditResult result = AuditRobot(robot);
   json.Write([&] { return ToJson(request, robot, result); });
   junit.Write([&] { return WriteAuditJUnit(request, result); });
-  if (!json.TakesStdout()) Print(request, robot, result);
+  if (!json.is_stdout()) Print(request, robot, result);
   return result.IsGood() ? kSuccess : kDisagreement;
 }
 

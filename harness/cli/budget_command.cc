@@ -55,8 +55,7 @@ void Print(const ErrorBudget& budget) {
 int Run(const BudgetRequest& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), request.seed);
   CatchInterrupts();
-  RequirePageName(request.page);
-  ResultFile json(request.json_file), page(request.page);
+  OutputFile json(request.json_file), page(RequirePageName(request.page));
   std::unique_ptr<ProgressBar> bar;
   const auto progress = [&](long done, long total) {
     if (!bar) bar = std::make_unique<ProgressBar>("running", total, request.quiet);
@@ -67,7 +66,7 @@ int Run(const BudgetRequest& request) {
   if (bar) bar->Finish();
   json.Write([&] { return ToJson(budget); });
   page.Write([&] { return MakeBudgetPage(budget); });
-  if (!json.TakesStdout() && !page.TakesStdout()) {
+  if (!json.is_stdout() && !page.is_stdout()) {
     if (!request.quiet) Print(budget);
     if (budget.is_complete()) {
       fmt::print("{} sources: their errors add up to {:.2e} {}, all together make {:.2e} {}.\n",

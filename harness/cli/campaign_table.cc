@@ -100,13 +100,13 @@ void Campaign::Resume(const std::string& json_file, const std::vector<std::files
     fmt::print(stderr, "{} of {} faults are in {} already\n", faults.size(), total, json_file);
 }
 
-void Campaign::Make(std::uint64_t jobs, ProgressBar* bar,
-                    const std::function<CampaignFault(size_t fault)>& make) {
+void Campaign::Make(std::uint64_t jobs, bool quiet, const std::function<CampaignFault(size_t fault)>& make) {
   const size_t done = faults.size();
+  ProgressBar bar("changing", static_cast<long>(total), quiet);
   const auto run = [&](size_t i) { return FormatJson(cli::ToJson(make(done + i))); };
   const auto take = [&](size_t /*i*/, const std::string& result) {
     faults.push_back(ReadFault(Json::parse(result)));
-    bar->Update(static_cast<long>(faults.size()));
+    bar.Update(static_cast<long>(faults.size()));
   };
   RunJobs("a fault", total - done, CountJobs(jobs), run, take, IsInterrupted);
 }

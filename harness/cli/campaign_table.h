@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "harness/cli/command_line.h"
-#include "harness/cli/json_matrix.h"
+#include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/diagnosis/mutation.h"
 
@@ -39,9 +39,9 @@ struct Campaign {
   /// Takes what an interrupted campaign of this program that was asked for the same left in a file, and says
   /// so on standard error; nothing where there is none. @param inputs files whose texts have to be the same.
   void Resume(const std::string& json_file, const std::vector<std::filesystem::path>& inputs);
-  /// Makes the others, so many at a time as CountJobs says, until the user interrupts.
+  /// Makes the others, so many at a time as CountJobs says, with a progress bar, until the user interrupts.
   /// @param make makes one in a process of its own. @throws Error when such a process dies.
-  void Make(std::uint64_t jobs, ProgressBar* bar, const std::function<CampaignFault(size_t fault)>& make);
+  void Make(std::uint64_t jobs, bool quiet, const std::function<CampaignFault(size_t fault)>& make);
   /// Prints a line for each kind of fault, the exceptions, and the verdict; the verdict alone when quiet.
   void Print(bool quiet) const;
   /// The JSON that a file gets: `head`, "complete", "kinds" and "faults".

@@ -50,6 +50,7 @@ ValueCheck Fraction() {
 CLI::App* AddCommand(CLI::App* app, const std::string& name, const std::string& help,
                      const std::array<const char*, 2>& examples) {
   CLI::App* const command = app->add_subcommand(name, help);
+  if (app->get_parent() != nullptr) command->group("Subcommands");
   command->footer(std::string("Examples:\n  ") + examples[0] + "\n  " + examples[1]);
   return command;
 }

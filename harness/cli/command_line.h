@@ -52,7 +52,8 @@ CLI::Option* AddOption(CLI::App* command, const std::string& name, Value* value,
   return option;
 }
 
-/// Adds a command. @param examples two lines to type, which its help shows.
+/// Adds a command, under the heading that is the program's group. @param examples two lines to type, which
+/// its help shows.
 CLI::App* AddCommand(CLI::App* app, const std::string& name, const std::string& help,
                      const std::array<const char*, 2>& examples);
 

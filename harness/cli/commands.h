@@ -107,8 +107,6 @@ void AddRenderCommand(CLI::App* app);
 void AddReportCommand(CLI::App* app);
 void AddHelpCommands(CLI::App* app);
 void AddStudyCommand(CLI::App* app);
-/// Those of its commands that read a study's database: report, show, export.
-void AddStudyReadCommands(CLI::App* study);
 
 // Options that the commands which compare descriptions of a robot have in common.
 

@@ -116,10 +116,9 @@ int Run(CompareRequest request) {
     runs.push_back(std::make_unique<RunData>(folder));
     pointers.push_back(runs.back().get());
   }
-  RequirePageName(request.page);
-  ResultFile json(request.json), page(request.page);
+  OutputFile json(request.json), page(RequirePageName(request.page));
   const RunComparison comparison = CompareRuns(pointers, request.options);
-  const bool prints = !json.TakesStdout();
+  const bool prints = !json.is_stdout();
   if (prints) PrintAnswer(MakeAnswer(comparison));
   if (prints && !request.quiet) Print(request, comparison);
   json.Write([&] { return ToJson(comparison, request.run_folders); });

@@ -15,7 +15,7 @@
 #include "harness/cli/terminal.h"
 #include "harness/comparison/consistency.h"
 #include "harness/corrections/read_printed.h"
-#include "harness/report/files_page.h"
+#include "harness/report/page.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -42,10 +42,9 @@ std::string MakePage(const ConsistencyRequest& request, const Comparison& compar
 
 int Run(ConsistencyRequest request) {
   TakeFiles(&request);
-  if (!request.page_file.empty()) {
-    RequirePageName(request.page_file);
-    if (request.has_results()) throw InputError("consistency: --page must have two files");
-  }
+  RequirePageName(request.page_file);
+  if (!request.page_file.empty() && request.has_results())
+    throw InputError("consistency: --page must have two files");
   for (const std::string& joint : request.lock) AddHeldJoint(joint, &request.options.part);
   for (const std::string& name : request.ignore) {
     const bool is_word =
@@ -55,9 +54,7 @@ int Run(ConsistencyRequest request) {
   if (request.has_results() && !request.options.part.empty())
     throw InputError("consistency: --only, --lock and --ignore BODY must have two files");
   CatchInterrupts();
-  ResultFile json(request.json_file);
-  ResultFile junit(request.junit_file);
-  ResultFile page(request.page_file);
+  OutputFile json(request.json_file), junit(request.junit_file), page(request.page_file);
   ProgressBar bar("comparing", request.options.samples, request.quiet);
   const Comparison comparison = Compare(request, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
@@ -67,7 +64,7 @@ int Run(ConsistencyRequest request) {
   json.Write([&] { return ToJson(request, comparison, code); });
   junit.Write([&] { return WriteJUnit(request, comparison); });
   page.Write([&] { return MakePage(request, comparison, code); });
-  if (!json.TakesStdout()) {
+  if (!json.is_stdout()) {
     PrintAnswer(MakeAnswer(request, comparison, TryRepair(request, comparison)));
     if (!request.quiet) PrintTable(request, comparison);
     if (!request.page_file.empty()) fmt::print("page: {}\n", request.page_file);

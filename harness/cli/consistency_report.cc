@@ -9,7 +9,7 @@
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
 #include "harness/base/console.h"
-#include "harness/cli/junit_file.h"
+#include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/comparison/consistency.h"
 #include "harness/comparison/file_differences.h"

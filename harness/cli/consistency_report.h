@@ -9,7 +9,7 @@
 
 #include "harness/base/answer.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/json_matrix.h"
+#include "harness/cli/output_file.h"
 #include "harness/comparison/file_comparison.h"
 
 namespace dexcheck::cli {

@@ -108,23 +108,21 @@ int Run(DiagnoseRequest request) {
   DescriptionFile first(request.files.robot, request.urdf);
   DescriptionFile second(request.files.mjcf, request.urdf);
   CatchInterrupts();
-  ResultFile json(request.json_file);
-  std::optional<OutputFile> output;
-  if (!request.repaired_file.empty()) output.emplace(request.repaired_file);
+  OutputFile json(request.json_file), output(request.repaired_file);
   ProgressBar bar("comparing", request.options.samples, request.quiet);
   const Comparison comparison =
       Compare(request, &first, &second, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
   json.Write([&] { return ToJson(request, comparison); });
-  if (!json.TakesStdout()) {
+  if (!json.is_stdout()) {
     RepairTrial repair = TryRepair(request, comparison);
-    if (output) repair.command.clear();  // it is being written
+    if (output.exists()) repair.command.clear();  // it is being written
     PrintAnswer(MakeAnswer(request, comparison, repair));
   }
   if (IsInterrupted()) return ReportFailure("interrupted");
-  if (output) {
-    const std::string line = WriteRepair(request, first, &second, comparison, &*output);
-    if (!json.TakesStdout()) fmt::print("{}\n", Wrap(line, 2));
+  if (output.exists()) {
+    const std::string line = WriteRepair(request, first, &second, comparison, &output);
+    if (!json.is_stdout()) fmt::print("{}\n", Wrap(line, 2));
   }
   return comparison.Agrees() ? kSuccess : kDisagreement;
 }

@@ -10,7 +10,6 @@
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/consistency_report.h"
-#include "harness/cli/junit_file.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/comparison/engine_comparison.h"
@@ -158,8 +157,7 @@ int Run(EnginesRequest request) {
   CatchInterrupts();
   request.options.tolerance = std::pow(10.0, -request.digits);
   request.options.programs_folder = FindInstalled("libexec/dexcheck");
-  ResultFile json(request.json_file);
-  ResultFile junit(request.junit_file);
+  OutputFile json(request.json_file), junit(request.junit_file);
   const DescriptionFile file(request.robot, request.urdf);
   const RobotDescription robot = file.Describe();
   const RobotModel model(robot.spec);
@@ -172,7 +170,7 @@ int Run(EnginesRequest request) {
   if (!result.Agrees()) code = kDisagreement;
   json.Write([&] { return ToJson(request, model, result); });
   junit.Write([&] { return WriteEnginesJUnit(request, model, result); });
-  if (!json.TakesStdout()) {
+  if (!json.is_stdout()) {
     PrintAnswer(AnswerForEngines(request, result));
     if (!request.quiet) PrintTable(request, model, result);
   }

@@ -23,7 +23,6 @@
 #include "controller/object/object_dynamics.h"
 #include "harness/base/files.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/descriptions/analytic_provider.h"

@@ -100,8 +100,7 @@ int Run(MotionRequest request) {
     request.options.calc_overlap = [&](const VectorXd& q) { return contact->CalcDepth(q); };
   }
   CatchInterrupts();
-  ResultFile json(request.json_file);
-  ResultFile motion(request.motion_file);
+  OutputFile json(request.json_file), motion(request.motion_file);
   std::optional<RecordingSet> recorded;
   if (!recordings.empty())
     recorded.emplace(model, &recordings, ReadOptions{}, [](long) { return !IsInterrupted(); });
@@ -113,7 +112,7 @@ int Run(MotionRequest request) {
   const bool complete = !IsInterrupted();
   motion.Write([&] { return WriteMotion(model, design.motion, request.options.rate); });
   json.Write([&] { return ToJson(model, design, complete); });
-  if (!json.TakesStdout() && !motion.TakesStdout()) {
+  if (!json.is_stdout() && !motion.is_stdout()) {
     if (!request.quiet) Print(request, model, design);
     fmt::print("{}: {} of {} combinations of sizes are known to a third of what is plausible, {} before.\n",
                complete ? "FOUND" : "INTERRUPTED, so far", design.known_after, design.combinations,

@@ -13,7 +13,6 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
@@ -179,7 +178,7 @@ int Run(const ExportRequest& request) {
   }
   const LogReader log(request.run_folder / "log.h5");
   const std::vector<SignalInfo> signals = ListWanted(log, request);
-  ResultFile json(request.json_file);
+  OutputFile json(request.json_file);
   std::optional<McapWriter> messages;
   if (!request.mcap_file.empty()) messages.emplace(request.mcap_file);
   if (request.list) PrintList(log, signals);

@@ -16,10 +16,6 @@
 namespace dexcheck::cli {
 namespace {
 
-std::string Join(const std::vector<std::string>& words, const char* between) {
-  return fmt::format("{}", fmt::join(words, between));
-}
-
 std::vector<const CLI::App*> ListCommands(const CLI::App& app) {
   return app.get_subcommands([](const CLI::App*) { return true; });
 }
@@ -48,52 +44,38 @@ std::vector<std::string> ListOptionNames(const CLI::App& command) {
   return names;
 }
 
-/// A command with its name, "study run", which is empty for the program itself.
-struct NamedCommand {
-  std::string name;
-  const CLI::App* command;
-};
-
-void AddNamed(const CLI::App& app, const std::string& name, std::vector<NamedCommand>* all) {
-  all->push_back({name, &app});
-  for (const CLI::App* command : ListCommands(app))
-    AddNamed(*command, (name.empty() ? "" : name + " ") + command->get_name(), all);
+/// Adds for a command and those below it how words lead to them, and what may follow them. Each pattern of
+/// `case "$command $word"` adds a word to a command: "run" after "study" makes "study run".
+/// @param name "study run", which is empty for the program itself.
+void AddCompletion(const CLI::App& app, const std::string& name, std::string* words, std::string* choices) {
+  const std::vector<const CLI::App*> commands = ListCommands(app);
+  *choices += fmt::format("    '{}') words='{}'; [[ $cur != -* ]] || words='{}'; files={} ;;\n", name,
+                          fmt::join(ListNextWords(app), " "), fmt::join(ListOptionNames(app), " "),
+                          commands.empty() || name.empty() ? "1" : "");
+  for (const CLI::App* command : commands) {
+    const std::string longer = (name.empty() ? "" : name + " ") + command->get_name();
+    *words += fmt::format("      '{} {}') command='{}' ;;\n", name, command->get_name(), longer);
+    AddCompletion(*command, longer, words, choices);
+  }
 }
 
 /// Words before the cursor choose the command; then its options, its commands, scenarios and files follow.
 std::string MakeBashCompletion(const CLI::App& app) {
-  std::vector<NamedCommand> commands;
-  AddNamed(app, "", &commands);
-  std::string text =
-      "# bash completion for dexcheck: put it into /usr/share/bash-completion/completions/dexcheck, or "
-      "source it.\n"
-      "_dexcheck() {\n"
-      "  local cur=${COMP_WORDS[COMP_CWORD]} command= word\n"
-      "  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n"
-      "    case \"$command $word\" in\n";
-  // Each pattern of `case "$command $word"` adds a word to a command: "run" after "study" makes "study run".
-  for (const auto& [name, command] : commands) {
-    if (name.empty()) continue;
-    const size_t space = name.rfind(' ');
-    const std::string before = space == std::string::npos ? "" : name.substr(0, space);
-    const std::string last = space == std::string::npos ? name : name.substr(space + 1);
-    text += fmt::format("      '{} {}') command='{}' ;;\n", before, last, name);
-  }
-  text += "    esac\n  done\n  local words= files=\n  case $command in\n";
-  for (const auto& [name, command] : commands) {
-    text += fmt::format("    '{}') words='{}'; [[ $cur != -* ]] || words='{}'; files={} ;;\n", name,
-                        Join(ListNextWords(*command), " "), Join(ListOptionNames(*command), " "),
-                        ListCommands(*command).empty() || name.empty() ? "1" : "");
-  }
-  text +=
-      "  esac\n"
-      "  mapfile -t COMPREPLY < <(compgen -W \"$words\" -- \"$cur\")\n"
-      "  [[ -z $files || $cur == -* ]] || { compopt -o filenames; mapfile -t -O \"${#COMPREPLY[@]}\" "
-      "COMPREPLY < <(compgen -f -- "
-      "\"$cur\"); }\n"
-      "}\n"
-      "complete -F _dexcheck dexcheck\n";
-  return text;
+  std::string words, choices;
+  AddCompletion(app, "", &words, &choices);
+  return "# bash completion for dexcheck: put it into /usr/share/bash-completion/completions/dexcheck, or "
+         "source it.\n"
+         "_dexcheck() {\n"
+         "  local cur=${COMP_WORDS[COMP_CWORD]} command= word\n"
+         "  for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n"
+         "    case \"$command $word\" in\n" +
+         words + "    esac\n  done\n  local words= files=\n  case $command in\n" + choices +
+         "  esac\n"
+         "  mapfile -t COMPREPLY < <(compgen -W \"$words\" -- \"$cur\")\n"
+         "  [[ -z $files || $cur == -* ]] || { compopt -o filenames; mapfile -t -O \"${#COMPREPLY[@]}\" "
+         "COMPREPLY < <(compgen -f -- \"$cur\"); }\n"
+         "}\n"
+         "complete -F _dexcheck dexcheck\n";
 }
 
 }  // namespace

@@ -8,7 +8,6 @@
 #include "harness/base/console.h"
 #include "harness/base/files.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/read_description.h"
@@ -47,7 +46,7 @@ void WriteJson(const ImportRequest& request, const RobotDescription* robot,
     json["changes"].push_back(
         {{"file", change.file}, {"line", change.line}, {"word", change.word}, {"what", change.what}});
   }
-  OutputFile(request.json_file).Write(FormatJson(json));
+  OutputFile(request.json_file).Write(json);
 }
 
 /// The copy or table, unless the JSON takes its place on standard output.
@@ -81,7 +80,7 @@ int WriteCopy(const ImportRequest& request) {
     Warn(std::filesystem::path(change.file).filename().string() + ":" + std::to_string(change.line) + ": " +
          change.word + ": " + change.what);
   }
-  if (!request.json_file.empty()) WriteJson(request, nullptr, mjcf.changes());
+  WriteJson(request, nullptr, mjcf.changes());
   return kSuccess;
 }
 
@@ -92,7 +91,7 @@ int Run(const ImportRequest& request) {
   // A file that cannot be read back must not be written: with a name that is too long, for example.
   ParseRobotModel(text, request.source.string() + " as a parameter file");
   WriteOut(request, text);
-  if (!request.json_file.empty()) WriteJson(request, &robot, {});
+  WriteJson(request, &robot, {});
   return kSuccess;
 }
 

@@ -11,7 +11,6 @@
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/descriptions/read_description.h"
@@ -163,11 +162,8 @@ int Run(JudgeRequest request) {
     return kSuccess;
   }
   CatchInterrupts();
-  ResultFile json(request.json_file);
-  std::optional<OutputFile> corrected;
-  if (!request.corrected.empty()) corrected.emplace(request.corrected);
-  if (!request.page_file.empty()) RequirePageName(request.page_file);
-  ResultFile page(request.page_file);
+  OutputFile json(request.json_file), corrected(request.corrected);
+  OutputFile page(RequirePageName(request.page_file));
   ProgressBar bar("rows", 0, request.quiet);
   JudgeOptions options;
   options.frames = frames;
@@ -176,7 +172,7 @@ int Run(JudgeRequest request) {
     // Rows that come in as they are recorded are reported as they come.
     constexpr size_t kAhead = 1000;
     options.ahead = kAhead;
-    if (!request.quiet && !json.TakesStdout())
+    if (!request.quiet && !json.is_stdout())
       options.on_second = [&model, has_head = false](double time, const std::vector<int>& joints,
                                                      const VectorXd& residual) mutable {
         if (!has_head) {
@@ -197,13 +193,13 @@ int Run(JudgeRequest request) {
   });
   bar.Finish();
   std::vector<std::string> written;
-  if (!IsInterrupted() && corrected) written = Correct(judgement, request, &*corrected);
+  if (!IsInterrupted() && corrected.exists()) written = Correct(judgement, request, &corrected);
   json.Write([&] { return ToJson(model, judgement, recordings); });
   page.Write([&] {
     const std::optional<ReplayData> replay = MakeMotionReplay(model, request.model, judgement);
     return MakeJudgePage(model, judgement, ToJson(model, judgement, recordings), replay ? &*replay : nullptr);
   });
-  if (!json.TakesStdout() && !(corrected && corrected->is_stdout())) {
+  if (!json.is_stdout() && !corrected.is_stdout()) {
     Answer answer = AnswerFor(model, judgement, recordings);
     if (IsInterrupted()) answer.remarks.emplace_back("interrupted: the later rows were not judged");
     answer.remarks.insert(answer.remarks.end(), written.begin(), written.end());
@@ -271,7 +267,7 @@ int CompareTwoRecordings(const RecordingPair& pair) {
   for (const std::filesystem::path& path : {pair.first, pair.second})
     recordings.push_back(OpenRecordingOf(model, path, pair.columns, /*is_complete=*/true, options.frames));
   CatchInterrupts();
-  ResultFile json(pair.json_file);
+  OutputFile json(pair.json_file);
   ProgressBar bar("rows", 0, pair.quiet);
   const RecordingComparison comparison = CompareRecordings(model, &recordings, options, [&](long rows) {
     bar.Update(rows);
@@ -280,7 +276,7 @@ int CompareTwoRecordings(const RecordingPair& pair) {
   bar.Finish();
   if (IsInterrupted()) return ReportFailure("interrupted");
   json.Write([&] { return ToJson(model, pair, comparison); });
-  if (!json.TakesStdout()) Print(model, pair, comparison);
+  if (!json.is_stdout()) Print(model, pair, comparison);
   return comparison.causes.empty() ? kSuccess : kDisagreement;
 }
 

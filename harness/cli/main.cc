@@ -56,33 +56,28 @@ int RunProgram(int argc, char** argv) {
   app.set_version_flag("--version", Version());
   app.footer("dexcheck A B, with two files of robots, is dexcheck consistency A B.");
   app.require_subcommand(1);
-  // The commands since the last heading.
-  const auto group = [&](const std::string& heading) {
-    for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; }))
-      if (command->get_group() == "Subcommands") command->group(heading);
-  };
+  app.group("Compare descriptions");  // of the commands that follow
   AddConsistencyCommand(&app);
   AddDiagnoseCommand(&app);
   AddAuditCommand(&app);
   AddImportCommand(&app);
   AddEvalCommand(&app);
   AddEngineComparisonCommand(&app);
-  group("Compare descriptions");
+  app.group("Run and look");
   AddRunCommand(&app, typed);
   AddReportCommand(&app);
   AddRenderCommand(&app);
   AddExportCommand(&app);
   AddCompareCommand(&app);
   AddJudgeCommand(&app);
-  group("Run and look");
+  app.group("Study");
   AddStudyCommand(&app);
   AddBudgetCommand(&app);
   AddMutateCommand(&app);
   AddExciteCommand(&app);
-  group("Study");
+  app.group("Set up");
   AddInitCommand(&app);
   AddHelpCommands(&app);
-  group("Set up");
   return RunCommandLine(&app, argc, argv);
 }
 

@@ -82,7 +82,7 @@ int MutateFiles(MutateRequest request) {
   RequireNoBalls(model, "when each number is changed on purpose");
   const Adapter adapter(model, *pair.engine, pair.source);
   CatchInterrupts();
-  ResultFile json(request.json_file);
+  OutputFile json(request.json_file);
   ConsistencyOptions unchanged;
   unchanged.samples = request.options.samples;
   unchanged.seed = request.options.seed;
@@ -104,8 +104,7 @@ int MutateFiles(MutateRequest request) {
                              {"diagnosed", request.options.diagnose},
                              {"seed", request.options.seed}}};
   campaign.Resume(request.json_file, {request.files.robot, request.files.mjcf});
-  ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet);
-  campaign.Make(request.jobs, &bar, [&](size_t i) {
+  campaign.Make(request.jobs, request.quiet, [&](size_t i) {
     if (i < formulas.size()) {
       RunFormulaMutant(adapter, request.options.samples, &formulas[i]);
       return Describe(formulas[i]);
@@ -114,9 +113,8 @@ int MutateFiles(MutateRequest request) {
     TryMutant(pair, request.options, &mutant);
     return Describe(mutant, campaign.names_causes);
   });
-  bar.Finish();
   json.Write([&] { return campaign.ToJson(); });
-  if (!json.TakesStdout()) campaign.Print(request.quiet);
+  if (!json.is_stdout()) campaign.Print(request.quiet);
   return campaign.ToExitCode();
 }
 
@@ -204,7 +202,7 @@ int MutateRun(const MutateRequest& request) {
   options.duration = request.duration.value_or(options.draws > 0 ? 0.0 : options.duration);
   const ScenarioFiles files = FindScenario(request.files.robot, request.overrides.List(), /*seed=*/0);
   CatchInterrupts();
-  ResultFile json(request.json_file), page(request.page_file);
+  OutputFile json(request.json_file), page(request.page_file);
   RunCampaign runs(files.scenario, files.robot, files.mjcf, options, IsInterrupted);
   Campaign campaign{.faults = {},
                     .total = runs.mutants().size(),
@@ -219,15 +217,13 @@ int MutateRun(const MutateRequest& request) {
                              {"together", options.together},
                              {"draw_seed", options.seed}}};
   campaign.Resume(request.json_file, {files.scenario.source, files.robot, files.mjcf});
-  ProgressBar bar("changing", static_cast<long>(campaign.total), request.quiet || json.TakesStdout());
-  campaign.Make(request.jobs, &bar, [&](size_t i) {
+  campaign.Make(request.jobs, request.quiet || json.is_stdout(), [&](size_t i) {
     runs.Run(i, [] { return false; });
     return Describe(runs.mutants()[i]);
   });
-  bar.Finish();
   json.Write([&] { return campaign.ToJson(); });
   page.Write([&] { return MakeCampaignPage(campaign.ToJson()); });
-  if (json.TakesStdout()) return campaign.ToExitCode();
+  if (json.is_stdout()) return campaign.ToExitCode();
   campaign.Print(request.quiet);
   if (options.draws > 0) PrintScores(campaign, options.together);
   return campaign.ToExitCode();

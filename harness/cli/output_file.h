@@ -1,34 +1,56 @@
 #pragma once
 
+// Files of results, as JSON, as JUnit's XML, or of any text.
+
 #include <cstdio>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <type_traits>
+#include <vector>
 
+#include "controller/common/types.h"
 #include "harness/base/bounded_json.h"
+#include "harness/base/check_record.h"
 #include "harness/base/files.h"
 
 namespace dexcheck::cli {
+
+using Json = nlohmann::ordered_json;
 
 /// A file that appears whole or not at all. Make it before long work starts, so that a bad path is known at
 /// once. Devices and pipes, which cannot be replaced, are written to in place; "-" is standard output.
 class OutputFile {
  public:
-  /// @throws InputError "PATH: cannot be written: reason".
+  /// @param path empty for no file: nothing is written then. @throws InputError "PATH: cannot be written:
+  /// reason".
   explicit OutputFile(const std::filesystem::path& path);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  /// Writes the whole content, once.
+  /// Writes the whole content, once. @param content a text, JSON, or a function that makes one of them, which
+  /// is called if there is a file.
   /// @throws InputError like the constructor; what stood under the path before is then untouched.
-  void Write(const std::string& text);
+  template <typename Content>
+  void Write(const Content& content) {
+    if constexpr (std::is_invocable_v<Content>) {
+      if (exists()) Write(content());
+    } else if constexpr (std::is_same_v<Content, Json>) {
+      Write(FormatJson(content));
+    } else {
+      Append(content);
+      Finish();
+    }
+  }
 
   /// Write in pieces: Append any number of times, then Finish, without which no file appears.
   void Append(const std::string& text);
   void Finish();
 
+  [[nodiscard]] bool exists() const { return file_ != nullptr; }
+  /// The results take standard output: other text would spoil them.
   [[nodiscard]] bool is_stdout() const { return file_ == stdout; }
 
  private:
@@ -39,32 +61,36 @@ class OutputFile {
   std::FILE* file_ = nullptr;
 };
 
-/// The file of an option such as --json, made before long work starts; none when the option is not given.
-class ResultFile {
- public:
-  /// @param path empty for none. @throws InputError as OutputFile.
-  explicit ResultFile(const std::string& path) {
-    if (!path.empty()) file_.emplace(path);
-  }
-  /// Writes the text or the JSON that a function makes, if there is a file.
-  template <typename Make>
-  void Write(const Make& make) {
-    if (!file_) return;
-    if constexpr (std::is_same_v<decltype(make()), std::string>) {
-      file_->Write(make());
-    } else {
-      file_->Write(FormatJson(make()));
-    }
-  }
-  /// The results take standard output: other text would spoil them.
-  [[nodiscard]] bool TakesStdout() const { return file_ && file_->is_stdout(); }
+/// @returns the path of a page. @throws InputError when the name says that the file is something else than an
+/// HTML page, such as "page.pdf".
+const std::filesystem::path& RequirePageName(const std::filesystem::path& path);
 
- private:
-  std::optional<OutputFile> file_;
+/// A vector as a list.
+inline Json ToList(const Eigen::Ref<const VectorXd>& vector) {
+  return std::vector<double>(vector.begin(), vector.end());
+}
+
+/// A matrix as a list of rows.
+inline Json ToRows(const Eigen::Ref<const MatrixXd>& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) rows.push_back(ToList(matrix.row(i).transpose()));
+  return rows;
+}
+
+/// One check as a test case.
+struct JUnitCase {
+  std::string group;    ///< "constant", "term", "inverse_dynamics": its class.
+  std::string name;     ///< "M_bar"
+  std::string failure;  ///< What is wrong, in one or more lines; empty when nothing is.
+  std::string output;   ///< What is worth knowing anyway.
 };
 
-/// @throws InputError when the name says that the file is something else than an HTML page, such as
-/// "page.pdf".
-void RequirePageName(const std::filesystem::path& path);
+/// A check that has run, as a test case. @param where the worst number belongs to.
+JUnitCase MakeJUnitCase(const std::string& group, const CheckRecord& record, const std::string& where);
+
+/// The cases of one command as a JUnit XML document, which servers of continuous integration read. An error
+/// is what kept the command from its end.
+std::string WriteJUnit(const std::string& suite, const std::vector<JUnitCase>& cases, double seconds,
+                       const std::string& error = "");
 
 }  // namespace dexcheck::cli

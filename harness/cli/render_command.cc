@@ -19,7 +19,6 @@
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/terminal.h"
@@ -123,7 +122,7 @@ ExitCode Run(RenderRequest request) {
   request.video.panel = !request.no_panel;
   const RecordedFrames recorded = ReadRecordedFrames(request.run_folder);
   const RunView run = {recorded.model.get(), &recorded.frames};
-  ResultFile summary(request.json_file);
+  OutputFile summary(request.json_file);
   if (!request.still && !WriteVideo(run, request.video, out, request.quiet)) return kFailure;
   if (request.still) WriteStill(request, run, out);
   if (!request.json_file.empty()) {

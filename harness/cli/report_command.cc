@@ -5,7 +5,6 @@
 #include <string>
 
 #include "harness/cli/commands.h"
-#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/report/page.h"
@@ -30,8 +29,7 @@ RunScene MakeStillScene(const RunData& run, const std::filesystem::path& folder)
 }
 
 int Run(const ReportRequest& request) {
-  ResultFile json_file(request.json_file);
-  ResultFile tex_file(request.tex_file);
+  OutputFile json_file(request.json_file), tex_file(request.tex_file);
   RequirePageName(request.out);
   RequireKind(request.run_folder, "run's folder");
   ReportFiles files = MakeReportFiles(request.run_folder);
@@ -39,7 +37,7 @@ int Run(const ReportRequest& request) {
   WriteRunReport(request.run_folder, files, request.no_replay ? MakeStillScene : MakeRunScene);
   json_file.Write([&] { return Json{{"page", files.page.string()}, {"figures", files.figures.string()}}; });
   tex_file.Write([&] { return MakeTexTable(RunData(request.run_folder)); });
-  const bool prints = !json_file.TakesStdout() && !tex_file.TakesStdout();
+  const bool prints = !json_file.is_stdout() && !tex_file.is_stdout();
   if (!request.quiet && prints) fmt::print("{}\n", files.page.string());
   return kSuccess;
 }

@@ -14,7 +14,6 @@
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/json_matrix.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/cli/run_report.h"
@@ -23,8 +22,8 @@
 #include "harness/engine/machine.h"
 #include "harness/report/page.h"
 #include "harness/report/run_data.h"
-#include "harness/run/declared_share.h"
 #include "harness/run/joint_margins.h"
+#include "harness/run/runner.h"
 
 namespace dexcheck::cli {
 namespace {
@@ -114,7 +113,7 @@ int RunScenario(const RunRequest& request) {
   }
   ScenarioFiles files = FindScenario(request.scenario, overrides, request.seed);
   const std::string difference = request.no_check ? "" : JudgeFiles(&files);
-  ResultFile junit(request.junit_file);
+  OutputFile junit(request.junit_file);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
   Runner runner(setup, !request.no_check, MakeParts(request, setup));
@@ -146,7 +145,7 @@ int RunScenario(const RunRequest& request) {
   const ExitCode verdict = ToExitCode(result);
   std::exception_ptr unprinted;
   try {
-    if (!request.json_file.empty()) OutputFile(request.json_file).Write(text);
+    OutputFile(request.json_file).Write(text);
     if (request.json_file != "-") {
       Answer answer = MakeRunAnswer(summary, ListChecksOf(runner.loop()));
       if (result.attribution.cause == Cause::kModel && files.scenario.model_overrides.empty())

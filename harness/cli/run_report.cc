@@ -10,7 +10,7 @@
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
 #include "harness/checks/check_table.h"
-#include "harness/cli/junit_file.h"
+#include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {

@@ -1,6 +1,6 @@
 #pragma once
 
-// The page of a campaign of faults.
+// Pages: of two files, of a campaign of faults, and of a run.
 
 #include <filesystem>
 #include <functional>
@@ -9,11 +9,20 @@
 #include <string>
 #include <vector>
 
+#include "harness/corrections/printed_robot.h"
 #include "harness/report/figure.h"
 #include "harness/report/replay.h"
 #include "harness/report/run_data.h"
 
 namespace dexcheck {
+
+/// Returns a whole HTML document that loads nothing: the verdict, the causes with their numbers, the terms
+/// that were compared, and both robots one over the other. Each link is drawn by what its file states: rods
+/// to the links that it carries, the axis of its joint, its centre of mass, and the ellipsoid that has its
+/// mass and inertia. What a cause is about has the colour of its file.
+/// @param result what `consistency --json` writes of the two.
+std::string MakeFilesPage(const PrintedRobot& first, const PrintedRobot& second,
+                          const nlohmann::ordered_json& result);
 
 /// A whole HTML document that loads nothing: what was found, a matrix of the faults that were made and the
 /// names that they got, and each of them. @param campaign as `mutate --json` writes it.

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "harness/diagnosis/signal_causes.h"
-#include "harness/run/declared_share.h"
+#include "harness/run/runner.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
 

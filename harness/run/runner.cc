@@ -1,4 +1,4 @@
-#include "harness/run/declared_share.h"
+#include "harness/run/runner.h"
 
 #include <algorithm>
 #include <cmath>
