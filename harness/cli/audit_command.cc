@@ -17,12 +17,9 @@
 namespace dexcheck::cli {
 namespace {
 
-struct AuditRequest {
+struct AuditRequest : Outputs {
   std::filesystem::path robot;
   UrdfOptions urdf = {.keep_impossible = true};
-  std::string json_file;
-  std::string junit_file;
-  bool quiet = false;
 };
 
 Json ConditionToJson(double value) { return std::isfinite(value) ? Json(value) : Json("infinity"); }

@@ -16,14 +16,11 @@
 namespace dexcheck::cli {
 namespace {
 
-struct BudgetRequest {
+struct BudgetRequest : Outputs {
   std::string scenario;
   Overrides overrides;
   std::uint64_t seed = 0;
   std::uint64_t jobs = 0;
-  std::string page;
-  std::string json_file;
-  bool quiet = false;
 };
 
 /// Returns a prediction or an error in two digits; "-" where a law is not known, so that there is none.
@@ -55,7 +52,7 @@ void Print(const ErrorBudget& budget) {
 int Run(const BudgetRequest& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), request.seed);
   CatchInterrupts();
-  OutputFile json(request.json_file), page(RequirePageName(request.page));
+  OutputFile json(request.json_file), page(RequirePageName(request.page_file));
   std::unique_ptr<ProgressBar> bar;
   const auto progress = [&](long done, long total) {
     if (!bar) bar = std::make_unique<ProgressBar>("running", total, request.quiet);
@@ -90,7 +87,7 @@ void AddBudgetCommand(CLI::App* app) {
       ->required();
   AddOverrideOptions(command, &request->overrides);
   AddSeedOption(command, &request->seed, "Seed of all that is random");
-  AddOption(command, "--page FILE.html", &request->page, "Write table and bar chart as a page");
+  AddOption(command, "--page FILE.html", &request->page_file, "Write table and bar chart as a page");
   AddJobsOption(command, "Runs", &request->jobs);
   AddJsonOption(command, "the budget", &request->json_file);
   command->add_flag("--quiet", request->quiet, "Print the last line only");

@@ -17,6 +17,12 @@
 
 namespace dexcheck::cli {
 
+/// Where a command's results go, and whether it prints less.
+struct Outputs {
+  std::string json_file, junit_file, page_file;  ///< Empty for none.
+  bool quiet = false;
+};
+
 /// The two files that describe one robot.
 struct RobotFiles {
   std::filesystem::path robot;
@@ -135,10 +141,8 @@ inline std::array<CLI::Option*, 2> AddToleranceOptions(CLI::App* command, Tolera
 }
 
 /// Two recordings against each other, by a model of the robot.
-struct RecordingPair {
+struct RecordingPair : Outputs {
   std::filesystem::path model, first, second, columns;
-  std::string json_file;
-  bool quiet = false;
 };
 
 /// Prints how far they are apart and what differs. @return the exit code: 1 where something differs.

@@ -22,14 +22,11 @@ namespace {
 /// Signals that are printed unless --all is given.
 constexpr size_t kMostPrinted = 10;
 
-struct CompareRequest {
+struct CompareRequest : Outputs {
   std::vector<std::string> run_folders;
   RunComparisonOptions options;
   std::optional<double> tolerance;  ///< With it, a difference is exit code 1.
   bool all = false;
-  bool quiet = false;
-  std::string page;
-  std::string json;
   std::filesystem::path model, columns;  ///< Of recordings that are no runs.
 };
 
@@ -103,8 +100,8 @@ int Run(CompareRequest request) {
   request.options.tolerance = request.tolerance.value_or(0.0);
   if (!request.model.empty()) {
     if (request.run_folders.size() != 2) throw InputError("--model: needs two recordings");
-    return CompareTwoRecordings({request.model, request.run_folders[0], request.run_folders[1],
-                                 request.columns, request.json, request.quiet});
+    return CompareTwoRecordings(
+        {request, request.model, request.run_folders[0], request.run_folders[1], request.columns});
   }
   if (request.tolerance && !(*request.tolerance >= 0.0 && std::isfinite(*request.tolerance)))
     throw InputError("--tolerance: must not be negative, got " + FormatNumber(*request.tolerance));
@@ -116,14 +113,14 @@ int Run(CompareRequest request) {
     runs.push_back(std::make_unique<RunData>(folder));
     pointers.push_back(runs.back().get());
   }
-  OutputFile json(request.json), page(RequirePageName(request.page));
+  OutputFile json(request.json_file), page(RequirePageName(request.page_file));
   const RunComparison comparison = CompareRuns(pointers, request.options);
   const bool prints = !json.is_stdout();
   if (prints) PrintAnswer(MakeAnswer(comparison));
   if (prints && !request.quiet) Print(request, comparison);
   json.Write([&] { return ToJson(comparison, request.run_folders); });
   page.Write([&] { return MakeComparisonPage(pointers, request.run_folders, comparison); });
-  if (!request.page.empty() && prints && !request.quiet) fmt::print("page: {}\n", request.page);
+  if (!request.page_file.empty() && prints && !request.quiet) fmt::print("page: {}\n", request.page_file);
   if (!request.tolerance || comparison.IsSame()) return kSuccess;
   if (comparison.signals.empty()) throw InputError("--tolerance: no signal was compared");
   return kDisagreement;
@@ -147,14 +144,14 @@ void AddCompareCommand(CLI::App* app) {
             "Only these signals; * stands for any text: object/*,tau")
       ->delimiter(',')
       ->allow_extra_args(false);
-  AddOption(command, "--page FILE.html", &request->page,
+  AddOption(command, "--page FILE.html", &request->page_file,
             "Write a page with the signals overlaid and subtracted");
   CLI::Option* const model =
       AddOption(command, "--model MODEL", &request->model,
                 "Parameter file, URDF or MJCF of the robot of two recordings: what differs is named");
   AddOption(command, "--columns FILE.toml", &request->columns, "Which column of the recordings is what")
       ->needs(model);
-  AddJsonOption(command, "the numbers", &request->json);
+  AddJsonOption(command, "the numbers", &request->json_file);
   command->add_flag("--all", request->all, "Print all checks and signals");
   command->add_flag("--quiet", request->quiet, "Print the last line only");
 }

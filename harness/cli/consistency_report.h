@@ -15,16 +15,12 @@
 namespace dexcheck::cli {
 
 /// The two sides of a comparison, and the number of states.
-struct ConsistencyRequest {
+struct ConsistencyRequest : Outputs {
   RobotFiles files;
   UrdfOptions urdf;
   ToleranceOptions judging;
-  std::string json_file;
-  std::string junit_file;
-  bool quiet = false;
   ResultsSource source;  ///< What stands for B and provides terms.
   ConsistencyOptions options;
-  std::string page_file;            ///< Where the page of two files goes; empty for none.
   std::vector<std::string> lock;    ///< "JOINT" or "JOINT=VALUE".
   std::vector<std::string> ignore;  ///< Words of kIgnorable, and links.
   bool exact = false;               ///< Two files agree to rounding only, whatever digits they print.

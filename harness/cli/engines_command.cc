@@ -18,14 +18,11 @@
 namespace dexcheck::cli {
 namespace {
 
-struct EnginesRequest {
+struct EnginesRequest : Outputs {
   std::filesystem::path robot;
   EngineComparisonOptions options;
   UrdfOptions urdf;
-  std::string json_file;
-  std::string junit_file;
   int digits = 6;  ///< MuJoCo 2.2.2 diagonalises inertias to 1e-6 or better.
-  bool quiet = false;
 };
 
 /// Worst differences of a pair, by the names of terms; empty for those that one of the two does not have.

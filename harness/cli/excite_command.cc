@@ -23,11 +23,10 @@ namespace dexcheck::cli {
 namespace {
 
 /// A motion for a robot of which a recording is to be made.
-struct MotionRequest {
+struct MotionRequest : Outputs {
   std::filesystem::path model, mjcf, limits, columns;
   std::vector<std::filesystem::path> recorded;
-  std::string motion_file, json_file;
-  bool quiet = false;
+  std::string motion_file;
   MotionDesignOptions options;
 };
 

@@ -25,14 +25,13 @@ namespace {
 /// Text is handed on in pieces of this size.
 constexpr size_t kChunk = size_t{1} << 20;
 
-struct ExportRequest {
+struct ExportRequest : Outputs {
   std::filesystem::path run_folder;
   std::string csv_file;
   std::string mcap_file;
   std::vector<std::string> patterns;
   long every = 1;
   bool list = false;
-  std::string json_file;
 };
 
 /// The signals that are wanted, time before all others.

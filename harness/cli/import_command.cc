@@ -17,10 +17,9 @@
 namespace dexcheck::cli {
 namespace {
 
-struct ImportRequest {
+struct ImportRequest : Outputs {
   std::filesystem::path source;
   std::string out = "-";
-  std::string json_file;
   UrdfOptions urdf;
   bool downgrade = false;
   bool motors = false;

@@ -22,14 +22,12 @@
 namespace dexcheck::cli {
 namespace {
 
-struct JudgeRequest {
+struct JudgeRequest : Outputs {
   std::filesystem::path model, recording;
   std::vector<std::filesystem::path> more;  // recordings
   std::filesystem::path columns, corrected;
   UrdfOptions urdf;
-  std::string json_file;
-  std::filesystem::path page_file;
-  bool describe = false, quiet = false;
+  bool describe = false;
 };
 
 std::string Number(double value) { return fmt::format("{:.3g}", value); }
@@ -41,9 +39,11 @@ Answer AnswerFor(const RobotModel& model, const RecordingJudgement& judgement,
                     is_one ? recordings.front().name : std::to_string(recordings.size()) + " recordings");
 }
 
-void PrintBalances(const RobotModel& model, const RecordingJudgement& judgement,
-                   const std::vector<Recording>& recordings) {
+/// Prints what stands below the verdict.
+void PrintDetails(const RobotModel& model, const RecordingJudgement& judgement,
+                  const std::vector<Recording>& recordings) {
   const bool has_gains = judgement.balances.front().drive_gain != 0.0;
+  fmt::print("\n");
   for (size_t recording = 0; recording < recordings.size(); ++recording) {
     if (recordings.size() > 1) fmt::print("{}\n", recordings[recording].name);
     std::vector<TableRow> rows = {{{"torque, rms", "measured", "unexplained", "left", "noise", "held out"}}};
@@ -57,13 +57,6 @@ void PrintBalances(const RobotModel& model, const RecordingJudgement& judgement,
     }
     fmt::print("{}\n", FormatTable(has_gains ? "<>>>>>>" : "<>>>>>", rows));
   }
-}
-
-/// Prints what stands below the verdict.
-void PrintDetails(const RobotModel& model, const RecordingJudgement& judgement,
-                  const std::vector<Recording>& recordings) {
-  fmt::print("\n");
-  PrintBalances(model, judgement, recordings);
   for (const std::string& note : judgement.notes) fmt::print("{}\n", Wrap(note, 2));
 }
 
@@ -187,10 +180,8 @@ int Run(JudgeRequest request) {
         std::fflush(stdout);
       };
   }
-  const RecordingJudgement judgement = JudgeRecordings(model, &recordings, options, [&](long rows) {
-    bar.Update(rows);
-    return !IsInterrupted();
-  });
+  const RecordingJudgement judgement =
+      JudgeRecordings(model, &recordings, options, [&](long rows) { return bar.GoOn(rows); });
   bar.Finish();
   std::vector<std::string> written;
   if (!IsInterrupted() && corrected.exists()) written = Correct(judgement, request, &corrected);
@@ -269,10 +260,8 @@ int CompareTwoRecordings(const RecordingPair& pair) {
   CatchInterrupts();
   OutputFile json(pair.json_file);
   ProgressBar bar("rows", 0, pair.quiet);
-  const RecordingComparison comparison = CompareRecordings(model, &recordings, options, [&](long rows) {
-    bar.Update(rows);
-    return !IsInterrupted();
-  });
+  const RecordingComparison comparison =
+      CompareRecordings(model, &recordings, options, [&](long rows) { return bar.GoOn(rows); });
   bar.Finish();
   if (IsInterrupted()) return ReportFailure("interrupted");
   json.Write([&] { return ToJson(model, pair, comparison); });

@@ -23,17 +23,14 @@
 namespace dexcheck::cli {
 namespace {
 
-struct MutateRequest {
+struct MutateRequest : Outputs {
   RobotFiles files;  // or a scenario in the place of the robot, in whose run faults are made
   MutationOptions options;
   Overrides overrides;
   RunMutationOptions run;
   std::optional<double> duration;
-  std::string page_file;  // empty for none
   std::uint64_t jobs = 0;
   bool no_diagnosis = false;
-  std::string json_file;
-  bool quiet = false;
 };
 
 CampaignFault Describe(const TriedFault& tried) {

@@ -85,15 +85,13 @@ bool WriteRunVideo(const std::filesystem::path& run_folder, const std::string& o
 
 namespace {
 
-struct RenderRequest {
+struct RenderRequest : Outputs {
   std::filesystem::path run_folder;
   std::string size = "1280x720";
   std::optional<double> still;
   std::string out;
   VideoOptions video;
   bool no_panel = false;
-  bool quiet = false;
-  std::string json_file;
 };
 
 void WriteStill(const RenderRequest& request, const RunView& run, const std::string& out) {

@@ -12,12 +12,10 @@
 namespace dexcheck::cli {
 namespace {
 
-struct ReportRequest {
+struct ReportRequest : Outputs {
   std::filesystem::path run_folder;
   std::string out;
   bool no_replay = false;
-  bool quiet = false;
-  std::string json_file;
   std::string tex_file;
 };
 

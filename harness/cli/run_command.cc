@@ -28,7 +28,7 @@
 namespace dexcheck::cli {
 namespace {
 
-struct RunRequest {
+struct RunRequest : Outputs {
   std::string scenario;
   std::string out;
   Overrides overrides;
@@ -39,13 +39,10 @@ struct RunRequest {
   bool no_log = false;
   bool no_report = false;
   bool video = false;
-  bool quiet = false;
   bool all = false;  // checks are printed
   bool gains = false;
-  std::string json_file;
   bool list = false;
   std::string replay;
-  std::string junit_file;
   std::string command;  // as typed
 };
 

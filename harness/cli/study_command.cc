@@ -141,17 +141,17 @@ std::vector<Trial> SelectShard(std::vector<Trial> trials, const std::string& tex
   return trials;
 }
 
-/// "0-3, 7, 9" of ascending numbers; a long list ends in "...".
-std::string ListNumbers(const std::vector<long>& numbers) {
+/// "0-3, 7, 9" of trials in their order; a long list ends in "...".
+std::string ListNumbers(const std::vector<Trial>& trials) {
   constexpr size_t kMostRanges = 20;
   std::string text;
   size_t ranges = 0;
-  for (size_t i = 0; i < numbers.size(); ++ranges) {
+  for (size_t i = 0; i < trials.size(); ++ranges) {
     if (ranges == kMostRanges) return text + ", ...";
     size_t last = i;
-    while (last + 1 < numbers.size() && numbers[last + 1] == numbers[last] + 1) ++last;
-    text += (text.empty() ? "" : ", ") + std::to_string(numbers[i]);
-    if (last > i) text += "-" + std::to_string(numbers[last]);
+    while (last + 1 < trials.size() && trials[last + 1].number == trials[last].number + 1) ++last;
+    text += (text.empty() ? "" : ", ") + std::to_string(trials[i].number);
+    if (last > i) text += "-" + std::to_string(trials[last].number);
     i = last + 1;
   }
   return text;
@@ -168,16 +168,6 @@ void RemoveFailed(const Study& study, StudyStore* store) {
     store->RemoveFrom(row.trial.number);
     return;
   }
-}
-
-/// Those of these trials that have no row.
-std::vector<long> ListMissing(const std::vector<Trial>& trials, const StudyStore& store) {
-  const std::vector<long> done = store.ListNumbers();
-  std::vector<long> missing;
-  for (const Trial& trial : trials) {
-    if (!std::ranges::binary_search(done, trial.number)) missing.push_back(trial.number);
-  }
-  return missing;
 }
 
 /// The trials that a search would make next, as far as its rows go.
@@ -212,7 +202,7 @@ int RunStudy(const StudyRequest& request) {
   bar.Finish();
   // From the file that is there now under this name: what another program removed is not done.
   const StudyStore made = StudyStore::Open(request.database);
-  const std::vector<long> missing = ListMissing(study.is_search() ? ListNext(made) : trials, made);
+  const std::vector<Trial> missing = ListMissing(study.is_search() ? ListNext(made) : trials, made);
   if (!missing.empty()) {
     const char* const why = IsInterrupted() ? "interrupted" : "another process has them";
     if (study.is_search()) {
@@ -259,7 +249,7 @@ int MergeStudies(const std::string& out, const std::vector<std::string>& databas
   if (!quiet) fmt::print("{}\n", Wrap(DescribeProgress(merged), 2));
   if (first.study().is_search()) return kSuccess;
   const std::vector<Trial> trials = ListTrials(first.study());
-  const std::vector<long> missing = ListMissing(trials, merged);
+  const std::vector<Trial> missing = ListMissing(trials, merged);
   if (missing.empty()) return kSuccess;
   throw Error(fmt::format("{}: {} of {} trials are missing: {}; merge again when they are done", out,
                           missing.size(), trials.size(), ListNumbers(missing)));

@@ -122,4 +122,21 @@ bool NeedsMargins(const Study& study) {
          std::ranges::any_of(study.constraints, is_of_margins, &Constraint::text);
 }
 
+std::string FindDifference(const Study& before, const Study& now) {
+  if (before.scenario != now.scenario) return "scenario";
+  if (before.controller != now.controller) return "controller";
+  if (before.overrides != now.overrides) return "set";
+  if (before.variations != now.variations) return "vary";
+  if (before.sample != now.sample) return "sample";
+  if (before.search != now.search) return "search";
+  if (before.seeds != now.seeds) return "seeds";
+  if (before.check != now.check) return "check";
+  if (before.stop_error != now.stop_error) return "stop_error";
+  const bool lack_margins = NeedsMargins(now) && !NeedsMargins(before);
+  if (lack_margins && before.metrics != now.metrics) return "metrics";
+  if (!lack_margins && !now.is_search()) return "";
+  if (before.objectives != now.objectives) return "objective";
+  return before.constraints != now.constraints ? "constraints" : "";
+}
+
 }  // namespace dexcheck

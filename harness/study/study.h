@@ -115,4 +115,8 @@ std::string FormatValue(const Variation& variation, double value);
 /// Assignments, "PATH=VALUE" each, that make the study's scenario this trial.
 std::vector<std::string> ListOverrides(const Study& study, const Trial& trial);
 
+/// The first key in which two studies make other trials, or ask for what the trials do not have; empty where
+/// the rows of one are rows of the other.
+std::string FindDifference(const Study& before, const Study& now);
+
 }  // namespace dexcheck

@@ -120,13 +120,17 @@ class TrialMaker {
 
 }  // namespace
 
+std::vector<Trial> ListMissing(const std::vector<Trial>& trials, const StudyStore& store) {
+  std::vector<Trial> missing = trials;
+  std::erase_if(missing, [done = store.ListNumbers()](const Trial& trial) {
+    return std::ranges::binary_search(done, trial.number);
+  });
+  return missing;
+}
+
 void RunTrials(const StudyInputs& inputs, const std::vector<Trial>& trials, const RunOptions& options,
                StudyStore* store) {
-  const std::vector<long> done = store->ListNumbers();
-  std::vector<Trial> missing;
-  for (const Trial& trial : trials) {
-    if (!std::ranges::binary_search(done, trial.number)) missing.push_back(trial);
-  }
+  const std::vector<Trial> missing = ListMissing(trials, *store);
   if (missing.empty()) return;
   auto finished = static_cast<long>(trials.size() - missing.size());
   TrialMaker maker(inputs, options, store);

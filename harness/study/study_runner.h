@@ -18,6 +18,9 @@ struct RunOptions {
   std::function<void(long finished)> report;  ///< Called with the number of trials that are done.
 };
 
+/// Returns the trials that have no row.
+std::vector<Trial> ListMissing(const std::vector<Trial>& trials, const StudyStore& store);
+
 /// Makes those of the trials that have no row. Trials that other living processes have are left to them.
 /// @throws Error when no process can be made, InputError when the database takes no more.
 void RunTrials(const StudyInputs& inputs, const std::vector<Trial>& trials, const RunOptions& options,

@@ -9,6 +9,10 @@
 #include <unordered_map>
 
 #include "controller/common/text.h"
+#include "harness/base/files.h"
+#include "harness/base/version.h"
+#include "harness/engine/engine.h"
+#include "harness/engine/mjcf_file.h"
 
 namespace dexcheck {
 namespace {
@@ -55,7 +59,28 @@ const std::string* FindText(const StudyIdentity& identity, const std::string& co
   return nullptr;
 }
 
+std::string HashMjcf(const std::filesystem::path& mjcf) {
+  std::string all;
+  for (const std::string& file : ListMjcfFiles(mjcf)) {
+    all += file + "\n" + HashBytes(ReadBytes(mjcf.parent_path() / file, kMostData)) + "\n";
+  }
+  return HashBytes(all);
+}
+
 }  // namespace
+
+StudyIdentity IdentifyStudy(const StudyInputs& inputs) {
+  return {{"layout", kStudyLayout},
+          {"name", inputs.study.name},
+          {"study", inputs.study.text},
+          {"scenario", inputs.scenario_text},
+          {"robot", ReadBytes(inputs.robot.string())},
+          {"mjcf_hash", HashMjcf(inputs.mjcf)},
+          {"controller_hash", inputs.controller_hash},
+          {"dexcheck_version", Version()},
+          {"git_revision", kGitRevision},
+          {"mujoco_version", mj_versionString()}};
+}
 
 StudyStore::StudyStore(const std::filesystem::path& path, int flags)
     : database_(std::make_unique<SqliteFile>(path.string(), flags)) {}

@@ -82,31 +82,12 @@ inline constexpr const char* kStudyLayout = "2";
 /// @throws InputError when a file cannot be read.
 StudyIdentity IdentifyStudy(const StudyInputs& inputs);
 
-/// The first key in which two studies make other trials, or ask for what the trials do not have; empty where
-/// the rows of one are rows of the other.
-std::string FindDifference(const Study& before, const Study& now);
-
-/// A finished trial.
-struct TrialRow {
-  Trial trial;
-  TrialResult result;
-  std::string machine;  ///< That made it, as DescribeMachine says; empty when that was not recorded.
-};
-
-/// The rms error that says how good the trials are: of the object's position, or of a motion of joints.
-Metric FindErrorMetric(const std::vector<TrialRow>& rows);
-
 /// Rows and where they are from, for messages.
 struct TrialSource {
   std::string name;
   /// Gives its rows one by one; called once, when its turn comes: not all need be in memory.
   std::function<void(const std::function<void(TrialRow&&)>& take)> read;
 };
-
-/// Whether two rows of one trial are the same: bit for bit when one machine made both, else within rounding
-/// (kMetricTolerance). A run that ended early amplifies rounding until it does: of two such the outcomes are
-/// compared.
-bool IsSame(const TrialRow& a, const TrialRow& b);
 
 /// Whether this program gives the same rows as the one that made these.
 using MakesSameRows = std::function<bool(const std::vector<TrialRow>&)>;

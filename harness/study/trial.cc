@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <new>
 #include <utility>
@@ -11,6 +13,7 @@
 #include "controller/common/text.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/files.h"
+#include "harness/engine/machine.h"
 #include "harness/run/joint_margins.h"
 #include "harness/run/runner.h"
 
@@ -294,6 +297,42 @@ void CheckTrials(StudyInputs* inputs) {
       MakeTrialScenario(*inputs, trial);
     }
   }
+}
+
+Metric FindErrorMetric(const std::vector<TrialRow>& rows) {
+  const bool of_joints = std::ranges::any_of(rows, [](const TrialRow& row) {
+    return std::isfinite(row.result.metrics[kJointErrorRms]) &&
+           !std::isfinite(row.result.metrics[kPositionErrorRms]);
+  });
+  return of_joints ? kJointErrorRms : kPositionErrorRms;
+}
+
+namespace {
+
+bool IsSameNumber(double a, double b) {
+  return (std::isnan(a) && std::isnan(b)) ||
+         std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
+}  // namespace
+
+bool IsSame(const TrialRow& a, const TrialRow& b) {
+  if (a.trial.seed != b.trial.seed || a.trial.parameters != b.trial.parameters ||
+      a.result.outcome != b.result.outcome) {
+    return false;
+  }
+  const bool exactly = a.machine == b.machine;
+  if (exactly && a.result.failure != b.result.failure) return false;
+  if (!exactly && !a.result.failure.empty() && !b.result.failure.empty()) return true;
+  for (size_t i = 0; i < a.result.metrics.size(); ++i) {
+    const double x = a.result.metrics[i];
+    const double y = b.result.metrics[i];
+    if (exactly ? !IsSameNumber(x, y)
+                : !IsSameWithin(kMetricTolerance, x, y, std::max(std::abs(x), std::abs(y)))) {
+      return false;
+    }
+  }
+  return a.result.failure == b.result.failure;
 }
 
 }  // namespace dexcheck

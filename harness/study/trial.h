@@ -47,4 +47,19 @@ TrialResult RunTrial(const StudyInputs& inputs, const Trial& trial);
 /// found before anything runs. Compiles the MJCF and reads the robot once, for all. @throws InputError.
 void CheckTrials(StudyInputs* inputs);
 
+/// A finished trial.
+struct TrialRow {
+  Trial trial;
+  TrialResult result;
+  std::string machine;  ///< That made it, as DescribeMachine says; empty when that was not recorded.
+};
+
+/// The rms error that says how good the trials are: of the object's position, or of a motion of joints.
+Metric FindErrorMetric(const std::vector<TrialRow>& rows);
+
+/// Whether two rows of one trial are the same: bit for bit when one machine made both, else within rounding
+/// (kMetricTolerance). A run that ended early amplifies rounding until it does: of two such the outcomes are
+/// compared.
+bool IsSame(const TrialRow& a, const TrialRow& b);
+
 }  // namespace dexcheck
