@@ -41,31 +41,6 @@ Viewpoint LookFrom(const Vector3d& eye, const Vector3d& look_at) {
           std::asin(std::clamp(way.z() / way.norm(), -1.0, 1.0))};
 }
 
-}  // namespace
-
-Viewpoint FitViewpoint(std::span<const VisibleSphere> spheres, double azimuth, double elevation,
-                       const ViewEdges& edges) {
-  Require(!spheres.empty(), "spheres", "must be at least one", 0.0);
-  const Vector3d forward(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
-                         std::sin(elevation));
-  const Vector3d right(std::sin(azimuth), -std::cos(azimuth), 0.0);
-  const Vector3d up = right.cross(forward);
-  Slab across{edges.left, edges.right};
-  Slab upwards{edges.bottom, edges.top};
-  double middle = 0.0;
-  for (const VisibleSphere& sphere : spheres) {
-    const double depth = forward.dot(sphere.center);
-    across.Include(right.dot(sphere.center), depth, sphere.radius);
-    upwards.Include(up.dot(sphere.center), depth, sphere.radius);
-    middle += depth / static_cast<double>(spheres.size());
-  }
-  const double depth = std::min(across.nearest(), upwards.nearest());
-  const Vector3d camera = depth * forward + across.FindMiddle(depth) * right + upwards.FindMiddle(depth) * up;
-  return {camera + (middle - depth) * forward, middle - depth, azimuth, elevation};
-}
-
-namespace {
-
 constexpr long kMostRows = 60;
 constexpr double kLeastWay = 0.3;             // m; a shorter way has no direction
 constexpr double kBearing = DegToRad(148.0);  // of the view, from the way's direction
@@ -100,6 +75,27 @@ Vector3d AddMovingGeoms(const mjModel& model, const mjData& data, std::vector<Vi
 }
 
 }  // namespace
+
+Viewpoint FitViewpoint(std::span<const VisibleSphere> spheres, double azimuth, double elevation,
+                       const ViewEdges& edges) {
+  Require(!spheres.empty(), "spheres", "must be at least one", 0.0);
+  const Vector3d forward(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+                         std::sin(elevation));
+  const Vector3d right(std::sin(azimuth), -std::cos(azimuth), 0.0);
+  const Vector3d up = right.cross(forward);
+  Slab across{edges.left, edges.right};
+  Slab upwards{edges.bottom, edges.top};
+  double middle = 0.0;
+  for (const VisibleSphere& sphere : spheres) {
+    const double depth = forward.dot(sphere.center);
+    across.Include(right.dot(sphere.center), depth, sphere.radius);
+    upwards.Include(up.dot(sphere.center), depth, sphere.radius);
+    middle += depth / static_cast<double>(spheres.size());
+  }
+  const double depth = std::min(across.nearest(), upwards.nearest());
+  const Vector3d camera = depth * forward + across.FindMiddle(depth) * right + upwards.FindMiddle(depth) * up;
+  return {camera + (middle - depth) * forward, middle - depth, azimuth, elevation};
+}
 
 Way FindWay(const mjModel& model, const RunFrames& run, mjData* data) {
   const auto find_middle = [&](long row) {

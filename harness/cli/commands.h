@@ -17,7 +17,7 @@
 
 namespace dexcheck::cli {
 
-/// Where a command's results go, and whether it prints less.
+/// The files that a command's results go to, and whether it prints less.
 struct Outputs {
   std::string json_file, junit_file, page_file;  ///< Empty for none.
   bool quiet = false;

@@ -168,6 +168,18 @@ Answer AnswerByTerms(const ConsistencyRequest& request, const Comparison& compar
   return answer;
 }
 
+/// @param compare the two as the options say.
+template <typename CompareBy>
+Comparison JudgeAsAsked(const ConsistencyRequest& request, const CompareBy& compare) {
+  ConsistencyOptions options = request.options;
+  const std::optional<double> tolerance = request.judging.Find();
+  options.within_digits = !request.exact && !tolerance;
+  options.precision = 0.01 * request.precision;
+  Comparison comparison = compare(options);
+  if (tolerance) comparison.JudgeByTolerance(*tolerance);
+  return comparison;
+}
+
 }  // namespace
 
 void AddJudgingOptions(CLI::App* command, ConsistencyRequest* request) {
@@ -184,22 +196,6 @@ void AddJudgingOptions(CLI::App* command, ConsistencyRequest* request) {
       ->excludes(tolerance[1])
       ->capture_default_str();
 }
-
-namespace {
-
-/// @param compare the two as the options say.
-template <typename CompareBy>
-Comparison JudgeAsAsked(const ConsistencyRequest& request, const CompareBy& compare) {
-  ConsistencyOptions options = request.options;
-  const std::optional<double> tolerance = request.judging.Find();
-  options.within_digits = !request.exact && !tolerance;
-  options.precision = 0.01 * request.precision;
-  Comparison comparison = compare(options);
-  if (tolerance) comparison.JudgeByTolerance(*tolerance);
-  return comparison;
-}
-
-}  // namespace
 
 Comparison Compare(const ConsistencyRequest& request, const Progress& progress) {
   return JudgeAsAsked(request, [&](const ConsistencyOptions& options) {

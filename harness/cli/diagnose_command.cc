@@ -28,34 +28,6 @@ RepairedFile Repair(const ConsistencyRequest& request, const DescriptionFile& fi
   return WriteRepaired(file, request.urdf, printed, reference, folder);
 }
 
-}  // namespace
-
-RepairTrial TryRepair(const ConsistencyRequest& request, const Comparison& comparison) {
-  constexpr int kStates = 50;
-  if (!comparison.causes || comparison.causes->items.empty()) return {};
-  const bool of_second = comparison.causes->of_second;
-  const std::filesystem::path& path = of_second ? request.files.mjcf : request.files.robot;
-  const std::filesystem::path& other = of_second ? request.files.robot : request.files.mjcf;
-  try {
-    const DescriptionFile file(path, request.urdf);
-    DescriptionFile reference(other, request.urdf);
-    RepairedFile repaired = Repair(request, file, reference, path.parent_path());
-    if (!repaired.agrees || repaired.text == file.text()) return {};
-    DescriptionFile written(path, std::move(repaired.text), request.urdf);
-    ConsistencyRequest short_request = request;
-    short_request.options.samples = kStates;
-    const Comparison again = Compare(short_request, &written, &reference, [](long) { return true; });
-    if (!again.Agrees()) return {"", ListDifferences(again).front()};
-  } catch (const InputError&) {
-    return {};
-  }
-  return {fmt::format("dexcheck diagnose {} {} --write FILE", QuoteForShell(path.string()),
-                      QuoteForShell(other.string())),
-          ""};
-}
-
-namespace {
-
 struct DiagnoseRequest : ConsistencyRequest {
   std::string repaired_file;
 };
@@ -128,6 +100,30 @@ int Run(DiagnoseRequest request) {
 }
 
 }  // namespace
+
+RepairTrial TryRepair(const ConsistencyRequest& request, const Comparison& comparison) {
+  constexpr int kStates = 50;
+  if (!comparison.causes || comparison.causes->items.empty()) return {};
+  const bool of_second = comparison.causes->of_second;
+  const std::filesystem::path& path = of_second ? request.files.mjcf : request.files.robot;
+  const std::filesystem::path& other = of_second ? request.files.robot : request.files.mjcf;
+  try {
+    const DescriptionFile file(path, request.urdf);
+    DescriptionFile reference(other, request.urdf);
+    RepairedFile repaired = Repair(request, file, reference, path.parent_path());
+    if (!repaired.agrees || repaired.text == file.text()) return {};
+    DescriptionFile written(path, std::move(repaired.text), request.urdf);
+    ConsistencyRequest short_request = request;
+    short_request.options.samples = kStates;
+    const Comparison again = Compare(short_request, &written, &reference, [](long) { return true; });
+    if (!again.Agrees()) return {"", ListDifferences(again).front()};
+  } catch (const InputError&) {
+    return {};
+  }
+  return {fmt::format("dexcheck diagnose {} {} --write FILE", QuoteForShell(path.string()),
+                      QuoteForShell(other.string())),
+          ""};
+}
 
 void AddDiagnoseCommand(CLI::App* app) {
   const auto [command, request] = AddRequest<DiagnoseRequest>(

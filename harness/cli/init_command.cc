@@ -185,22 +185,22 @@ std::string MakeRobotFolder(const InitRequest& request, const std::string& out, 
   std::string why =
       WriteRunnable(request, robot, parameters, made.path(), sources.mjcf.get(), &stand, &motion, &differ);
   if (!why.empty()) return why;
-  const RunFolder folder(out, "");
+  const fs::path folder = MakeRunFolder(out);
   std::error_code error;
-  fs::copy(made.path(), folder.path(), fs::copy_options::recursive, error);
-  if (error) throw InputError(folder.path().string() + ": cannot be written: " + error.message());
+  fs::copy(made.path(), folder, fs::copy_options::recursive, error);
+  if (error) throw InputError(folder.string() + ": cannot be written: " + error.message());
   fmt::print("{}: robot.toml, robot.xml, motion.toml, gains.toml, .github/workflows/dexcheck.yml\n",
-             folder.path().string());
+             folder.string());
   if (is_made)
     fmt::print("robot.xml was made of {}: what is wrong there is wrong in both\n",
                request.robot.filename().string());
   if (differ)
     fmt::print("the two differ, and a run will say so: dexcheck consistency {} {}\n", request.robot.string(),
-               (folder.path() / "robot.xml").string());
+               (folder / "robot.xml").string());
   fmt::print(
       "next: cd {} && dexcheck run motion.toml\n      dexcheck study run gains.toml --db gains.db\n"
       "      dexcheck budget motion.toml --set actuation.delay=0.002 --set {}\n",
-      folder.path().string(), stand ? "actuation.lag=0.002" : "sensing.joint_counts=4096");
+      folder.string(), stand ? "actuation.lag=0.002" : "sensing.joint_counts=4096");
   return "";
 }
 

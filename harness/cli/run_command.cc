@@ -114,11 +114,11 @@ int RunScenario(const RunRequest& request) {
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
   Runner runner(setup, !request.no_check, MakeParts(request, setup));
-  std::optional<RunFolder> folder;
-  if (!request.no_log) folder.emplace(request.out, setup.scenario().name);
+  std::filesystem::path folder;  // none without a log
+  if (!request.no_log) folder = MakeRunFolder(request.out, setup.scenario().name);
   std::optional<RunRecorder> recorder;
-  if (folder) {
-    recorder.emplace(folder->path() / "log.h5", runner.loop(), setup,
+  if (!folder.empty()) {
+    recorder.emplace(folder / "log.h5", runner.loop(), setup,
                      RunInputs{files.robot, files.mjcf, request.command});
   }
   RunWithProgress(setup.scenario().name, runner.loop().num_steps(), quiet, &runner,
@@ -135,9 +135,9 @@ int RunScenario(const RunRequest& request) {
   const Json summary = MakeSummary(setup, runner.loop(), result);
   const std::string text = FormatJson(summary);
   if (recorder) recorder->Close(text);
-  if (folder) OutputFile(folder->path() / "summary.json").Write(text);
-  if (folder && !result.gain_card.empty())
-    OutputFile(folder->path() / "gain_card.toml").Write(result.gain_card);
+  if (!folder.empty()) OutputFile(folder / "summary.json").Write(text);
+  if (!folder.empty() && !result.gain_card.empty())
+    OutputFile(folder / "gain_card.toml").Write(result.gain_card);
   junit.Write([&] { return WriteJUnit(setup, runner.loop(), result); });
   const ExitCode verdict = ToExitCode(result);
   std::exception_ptr unprinted;
@@ -151,7 +151,7 @@ int RunScenario(const RunRequest& request) {
                                              QuoteForShell(files.mjcf.string())));
       PrintAnswer(answer);
       if (!request.quiet)
-        PrintRunReport(setup, runner.loop(), result, folder ? folder->path().string() : "",
+        PrintRunReport(setup, runner.loop(), result, folder.string(),
                        request.all ? Detail::kAll : Detail::kCategories);
       if (request.gains)
         fmt::print("\n{}", result.gain_card.empty()
@@ -162,9 +162,9 @@ int RunScenario(const RunRequest& request) {
   } catch (const std::exception&) {
     unprinted = std::current_exception();  // standard output takes nothing: reported when all is done
   }
-  if (folder && !IsInterrupted()) {
+  if (!folder.empty() && !IsInterrupted()) {
     if (runner.loop().record().step > 0) {
-      DrawRun(request, folder->path(), verdict);
+      DrawRun(request, folder, verdict);
     } else if (request.video) {
       Warn("no video: the run ended before its first step");
     }

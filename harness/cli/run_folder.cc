@@ -140,15 +140,15 @@ void RequireFree(const std::filesystem::path& folder) {
     throw InputError(folder.string() + ": already holds files; give a new folder with --out");
 }
 
-RunFolder::RunFolder(const std::string& path, const std::string& name) : path_(path) {
+std::filesystem::path MakeRunFolder(std::filesystem::path path, const std::string& name) {
   if (path.empty()) {
-    path_ = std::filesystem::path("runs") / name;
-    for (int i = 2; Exists(path_); ++i) {
-      path_ = std::filesystem::path("runs") / (name + "-" + std::to_string(i));
-    }
+    path = std::filesystem::path("runs") / name;
+    for (int i = 2; Exists(path); ++i)
+      path = std::filesystem::path("runs") / (name + "-" + std::to_string(i));
   }
-  MakeFolder(path_);
-  RequireFree(path_);
+  MakeFolder(path);
+  RequireFree(path);
+  return path;
 }
 
 long RunWithProgress(const std::string& label, long rows, bool quiet, Runner* runner, RunRecorder* recorder) {
@@ -293,7 +293,7 @@ int CopyScenario(const std::string& name, const std::string& out) {
   const std::filesystem::path source = kScenarios.Find(name);
   const ScenarioFiles files = FindScenario(name, {}, 0);
   const std::vector<std::string> parts = ListMjcfFiles(files.mjcf);
-  const RunFolder folder(out.empty() ? source.stem().string() : out, "");
+  const std::filesystem::path folder = MakeRunFolder(out.empty() ? source.stem().string() : out);
   std::string text = ReadBytes(source.string());
   // The scenario writes the files' paths from its own folder.
   const auto refer = [&](const std::string& stated, const char* table, const char* key,
@@ -310,13 +310,13 @@ int CopyScenario(const std::string& name, const std::string& out) {
   };
   refer(files.scenario.model_file, "model", "file", files.robot);
   refer(files.scenario.mjcf_file, "plant", "mjcf", files.mjcf);
-  WriteFile(folder.path() / files.robot.filename(), ReadBytes(files.robot.string()));
+  WriteFile(folder / files.robot.filename(), ReadBytes(files.robot.string()));
   for (const std::string& part : parts)
-    WriteFile(folder.path() / part, ReadBytes(files.mjcf.parent_path() / part, kMostData));
-  const std::filesystem::path scenario = folder.path() / source.filename();
+    WriteFile(folder / part, ReadBytes(files.mjcf.parent_path() / part, kMostData));
+  const std::filesystem::path scenario = folder / source.filename();
   WriteFile(scenario, text);
   FindScenario(scenario.string(), {}, 0);
-  fmt::print("{0}: {1}, {2}, {3}\nnext: cd {0} && dexcheck run {1}\n", folder.path().string(),
+  fmt::print("{0}: {1}, {2}, {3}\nnext: cd {0} && dexcheck run {1}\n", folder.string(),
              scenario.filename().string(), files.robot.filename().string(), files.mjcf.filename().string());
   return 0;
 }

@@ -39,17 +39,10 @@ std::vector<ShippedScenario> ListShippedScenarios();
 /// @throws InputError when a folder has something in it.
 void RequireFree(const std::filesystem::path& folder);
 
-/// A folder for the results of one run, made new.
-class RunFolder {
- public:
-  /// @param path empty for runs/NAME, or runs/NAME-2 and so on when that is taken.
-  /// @throws InputError when the folder cannot be made, or has something in it.
-  RunFolder(const std::string& path, const std::string& name);
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
+/// Makes a new folder for the results of one run.
+/// @param path empty for runs/NAME, or runs/NAME-2 and so on when that is taken. @returns the path.
+/// @throws InputError when the folder cannot be made, or has something in it.
+std::filesystem::path MakeRunFolder(std::filesystem::path path, const std::string& name = "");
 
 /// Makes a run, or its first `rows` steps, with a progress bar, until the user interrupts it.
 /// @param recorder gets the steps; null for none. @returns how many those are.

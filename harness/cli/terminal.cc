@@ -25,6 +25,13 @@ bool TakesColors() {
   return takes;
 }
 
+constexpr int kUsualColumns = 80;  // of a terminal that does not report them
+constexpr int kWidestBar = 40;
+constexpr int kNarrowestBar = 8;
+constexpr std::chrono::milliseconds kRedrawEvery(100);
+// The time left is not estimated before: the first steps touch memory for the first time.
+constexpr double kLeastElapsed = 0.5;  // s
+
 }  // namespace
 
 int CountColumns(int descriptor) {
@@ -91,17 +98,6 @@ std::string Paint(Tone tone, std::string_view text) {
   const char* const code = tone == Tone::kGood ? "32" : tone == Tone::kBad ? "1;31" : "2";
   return "\033[" + std::string(code) + "m" + std::string(text) + "\033[0m";
 }
-
-namespace {
-
-constexpr int kUsualColumns = 80;  // of a terminal that does not report them
-constexpr int kWidestBar = 40;
-constexpr int kNarrowestBar = 8;
-constexpr std::chrono::milliseconds kRedrawEvery(100);
-// The time left is not estimated before: the first steps touch memory for the first time.
-constexpr double kLeastElapsed = 0.5;  // s
-
-}  // namespace
 
 ProgressBar::ProgressBar(std::string label, long total, bool quiet)
     : label_(std::move(label)), total_(total), visible_(!quiet && ::isatty(STDERR_FILENO) != 0) {}

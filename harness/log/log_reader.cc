@@ -149,6 +149,23 @@ void RequireHdf5(const std::filesystem::path& path) {
   if (H5Fis_hdf5(path.c_str()) <= 0) fail("not a dexcheck log");
 }
 
+/// Returns what `work` returns. @throws InputError that names the log for any exception of `work`.
+template <typename Work>
+auto Guard(const std::filesystem::path& path, const Work& work) {
+  try {
+    return work();
+  } catch (const std::runtime_error& error) {
+    throw InputError(path.string() + ": the log is damaged: " + Abbreviate(error.what()));
+  } catch (const std::exception&) {  // sizes that no memory and no list can have
+    throw InputError(path.string() + ": the log is damaged");
+  }
+}
+
+[[noreturn]] void FailToFind(const std::filesystem::path& path, const std::string& kind,
+                             const std::string& name, const std::vector<std::string>& known) {
+  throw InputError(path.string() + ": no " + kind + " " + Quote(name) + SuggestNearest(name, known));
+}
+
 }  // namespace
 
 /// Content of the file that is read on opening. Throws any std::exception when it is damaged.
@@ -242,27 +259,6 @@ class LogReader::File {
   std::map<std::string, std::string> texts_;
   std::vector<std::string> files_;
 };
-
-namespace {
-
-/// Returns what `work` returns. @throws InputError that names the log for any exception of `work`.
-template <typename Work>
-auto Guard(const std::filesystem::path& path, const Work& work) {
-  try {
-    return work();
-  } catch (const std::runtime_error& error) {
-    throw InputError(path.string() + ": the log is damaged: " + Abbreviate(error.what()));
-  } catch (const std::exception&) {  // sizes that no memory and no list can have
-    throw InputError(path.string() + ": the log is damaged");
-  }
-}
-
-[[noreturn]] void FailToFind(const std::filesystem::path& path, const std::string& kind,
-                             const std::string& name, const std::vector<std::string>& known) {
-  throw InputError(path.string() + ": no " + kind + " " + Quote(name) + SuggestNearest(name, known));
-}
-
-}  // namespace
 
 LogReader::LogReader(const std::filesystem::path& path) : path_(path) {
   const hdf5::SilencedErrors silenced;

@@ -40,47 +40,6 @@ std::string ReadBeginning(const fs::path& path) {
   return begin;
 }
 
-}  // namespace
-
-bool IsReadOnce(const fs::path& path) {
-  std::error_code error;
-  const fs::file_status status = fs::status(path, error);
-  return path == "-" || fs::is_fifo(status) || fs::is_socket(status) || fs::is_character_file(status);
-}
-
-std::unique_ptr<RecordingReader> OpenRecording(const fs::path& path, const std::string& topic, size_t width) {
-  if (IsReadOnce(path)) return OpenTextRecording(path, width);
-  if (IsFolder(path)) return OpenRecording(FindBagFile(path), topic, width);
-  NoteInput(path);
-  const std::string begin = ReadBeginning(path);
-  if (begin.empty()) throw InputError(path.string() + ": is empty");
-  if (begin.starts_with("\x89MCAP")) return OpenMcapRecording(path, topic);
-  if (begin.starts_with("SQLite format 3")) return OpenBagRecording(path, topic);
-  if (begin.starts_with("\x93NUMPY") || begin.starts_with("PK\x03\x04")) return OpenNumpyRecording(path);
-  if (begin.starts_with("\x89HDF\r\n")) return OpenHdf5Recording(path);
-  return OpenTextRecording(path, width);
-}
-
-TableReader::TableReader(std::string source, std::string format, std::vector<std::string> names,
-                         std::vector<std::vector<double>> columns)
-    : source_(std::move(source)), columns_(std::move(columns)) {
-  names_ = std::move(names);
-  format_ = std::move(format);
-  has_names_ = true;
-}
-
-bool TableReader::Next(std::vector<double>* row) {
-  if (columns_.empty() || row_ >= columns_.front().size()) return false;
-  row->resize(columns_.size());
-  for (size_t i = 0; i < columns_.size(); ++i) (*row)[i] = columns_[i][row_];
-  ++row_;
-  return true;
-}
-
-std::string TableReader::Where() const { return source_ + ": row " + std::to_string(row_); }
-
-namespace {
-
 constexpr size_t kLongestLine = size_t{1} << 20U;
 
 std::string_view WithoutQuotes(std::string_view cell) { return Trim(cell, " \t\r\"'"); }
@@ -271,6 +230,43 @@ class TextRecording : public RecordingReader {
 };
 
 }  // namespace
+
+bool IsReadOnce(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  return path == "-" || fs::is_fifo(status) || fs::is_socket(status) || fs::is_character_file(status);
+}
+
+std::unique_ptr<RecordingReader> OpenRecording(const fs::path& path, const std::string& topic, size_t width) {
+  if (IsReadOnce(path)) return OpenTextRecording(path, width);
+  if (IsFolder(path)) return OpenRecording(FindBagFile(path), topic, width);
+  NoteInput(path);
+  const std::string begin = ReadBeginning(path);
+  if (begin.empty()) throw InputError(path.string() + ": is empty");
+  if (begin.starts_with("\x89MCAP")) return OpenMcapRecording(path, topic);
+  if (begin.starts_with("SQLite format 3")) return OpenBagRecording(path, topic);
+  if (begin.starts_with("\x93NUMPY") || begin.starts_with("PK\x03\x04")) return OpenNumpyRecording(path);
+  if (begin.starts_with("\x89HDF\r\n")) return OpenHdf5Recording(path);
+  return OpenTextRecording(path, width);
+}
+
+TableReader::TableReader(std::string source, std::string format, std::vector<std::string> names,
+                         std::vector<std::vector<double>> columns)
+    : source_(std::move(source)), columns_(std::move(columns)) {
+  names_ = std::move(names);
+  format_ = std::move(format);
+  has_names_ = true;
+}
+
+bool TableReader::Next(std::vector<double>* row) {
+  if (columns_.empty() || row_ >= columns_.front().size()) return false;
+  row->resize(columns_.size());
+  for (size_t i = 0; i < columns_.size(); ++i) (*row)[i] = columns_[i][row_];
+  ++row_;
+  return true;
+}
+
+std::string TableReader::Where() const { return source_ + ": row " + std::to_string(row_); }
 
 std::unique_ptr<RecordingReader> OpenTextRecording(const std::filesystem::path& path, size_t width) {
   return std::make_unique<TextRecording>(path, width);

@@ -52,6 +52,15 @@ std::string EscapeTitle(const std::string& text) {
   return escaped;
 }
 
+static_assert(std::endian::native == std::endian::little, "browsers read the numbers in this order");
+
+/// Most numbers of all plots together: about 3 MB of base64.
+constexpr long kMostNumbers = 560'000;
+constexpr long kFewestPoints = 1000;
+
+/// Times in microseconds' resolution, which keeps their text short.
+double RoundTime(double time) { return std::round(1e6 * time) / 1e6; }
+
 }  // namespace
 
 std::string AssemblePage(const PageParts& parts) {
@@ -80,19 +89,6 @@ std::string AssemblePlotPage(const std::string& title, const char* script, const
   }
   return AssemblePage(parts);
 }
-
-namespace {
-
-static_assert(std::endian::native == std::endian::little, "browsers read the numbers in this order");
-
-/// Most numbers of all plots together: about 3 MB of base64.
-constexpr long kMostNumbers = 560'000;
-constexpr long kFewestPoints = 1000;
-
-/// Times in microseconds' resolution, which keeps their text short.
-double RoundTime(double time) { return std::round(1e6 * time) / 1e6; }
-
-}  // namespace
 
 std::string EmbedPlots(std::span<const PlotGroup> groups) {
   long curves = 0;

@@ -332,12 +332,6 @@ class MotionFigures {
   std::vector<Figure> figures_;
 };
 
-}  // namespace
-
-std::vector<Figure> MakeMotionFigures(const RunData& run) { return MotionFigures(run).Make(); }
-
-namespace {
-
 constexpr int kNamedCurves = 8;  // as many as there are colors
 
 Figure MakeFigure(const RunData& run, CheckCategory kind) {
@@ -372,6 +366,8 @@ Figure MakeFigure(const RunData& run, CheckCategory kind) {
 }
 
 }  // namespace
+
+std::vector<Figure> MakeMotionFigures(const RunData& run) { return MotionFigures(run).Make(); }
 
 std::vector<Figure> MakeResidualFigures(const RunData& run) {
   std::vector<Figure> figures;

@@ -54,6 +54,18 @@ SampledLoop FindTiming(const Scenario& scenario) {
   return loop;
 }
 
+std::string DescribeMargins(const JointMargins& margins) {
+  if (!margins.is_stable())
+    return fmt::format("# margins: none, the loop is not stable: spectral radius {:.6g}\n", margins.radius);
+  const StabilityMargins &one = margins.least, &all = margins.together;
+  return fmt::format(
+      "# margins, one torque at a time:\n#   gain {:.2f} ({})\n#   phase {:.1f} degrees ({})\n"
+      "#   delay {:.2f} ms ({})\n"
+      "# margins, all torques equally: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n",
+      one.gain, margins.gain_joint, RadToDeg(one.phase), margins.phase_joint, 1e3 * one.delay,
+      margins.delay_joint, all.gain, RadToDeg(all.phase), 1e3 * all.delay);
+}
+
 }  // namespace
 
 std::optional<LinearLoop> LineariseJoints(const Setup& setup, const JointGains& gains,
@@ -195,22 +207,6 @@ std::string CommentLines(const std::string& text) {
   for (std::string line; std::getline(lines, line);) commented += "#   " + line + "\n";
   return commented;
 }
-
-namespace {
-
-std::string DescribeMargins(const JointMargins& margins) {
-  if (!margins.is_stable())
-    return fmt::format("# margins: none, the loop is not stable: spectral radius {:.6g}\n", margins.radius);
-  const StabilityMargins &one = margins.least, &all = margins.together;
-  return fmt::format(
-      "# margins, one torque at a time:\n#   gain {:.2f} ({})\n#   phase {:.1f} degrees ({})\n"
-      "#   delay {:.2f} ms ({})\n"
-      "# margins, all torques equally: gain {:.2f}, phase {:.1f} degrees, delay {:.2f} ms\n",
-      one.gain, margins.gain_joint, RadToDeg(one.phase), margins.phase_joint, 1e3 * one.delay,
-      margins.delay_joint, all.gain, RadToDeg(all.phase), 1e3 * all.delay);
-}
-
-}  // namespace
 
 void JudgeGains(const Setup& setup, const ClosedLoop& loop, RunResult* result) {
   if (setup.joints() == nullptr || !loop.knows_law() || loop.record().step == 0) return;

@@ -85,6 +85,25 @@ Json ToJson(const JointMargins& margins) {
   return json;
 }
 
+/// Lists the causes, each with the channel that shows it.
+void AddCauses(const Json& causes, Answer* answer) {
+  bool has_several = false;
+  for (const Json& cause : causes) {
+    const std::string channel = FindText(cause, "/channel");
+    const std::string prefix = channel.empty() || channel == "observation" ? "" : channel + ": ";
+    answer->causes.push_back(prefix + FindText(cause, "/text"));
+    has_several = has_several || (FindText(cause, "/outcome") == "class" && cause["faults"].size() > 1);
+  }
+  if (has_several) answer->remarks.emplace_back("another motion may separate the causes joined by \"or\"");
+}
+
+/// Returns whether a motor is one that a run cannot drive.
+bool HasServos(const Json& checks) {
+  for (const auto& [name, check] : checks.items())
+    if (name.starts_with("motor_") && check.is_object() && !check.value("pass", true)) return true;
+  return false;
+}
+
 }  // namespace
 
 const char* NameOf(Verdict verdict) {
@@ -213,29 +232,6 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
   json["machine"] = DescribeMachine();
   return json;
 }
-
-namespace {
-
-/// Lists the causes, each with the channel that shows it.
-void AddCauses(const Json& causes, Answer* answer) {
-  bool has_several = false;
-  for (const Json& cause : causes) {
-    const std::string channel = FindText(cause, "/channel");
-    const std::string prefix = channel.empty() || channel == "observation" ? "" : channel + ": ";
-    answer->causes.push_back(prefix + FindText(cause, "/text"));
-    has_several = has_several || (FindText(cause, "/outcome") == "class" && cause["faults"].size() > 1);
-  }
-  if (has_several) answer->remarks.emplace_back("another motion may separate the causes joined by \"or\"");
-}
-
-/// Returns whether a motor is one that a run cannot drive.
-bool HasServos(const Json& checks) {
-  for (const auto& [name, check] : checks.items())
-    if (name.starts_with("motor_") && check.is_object() && !check.value("pass", true)) return true;
-  return false;
-}
-
-}  // namespace
 
 Answer MakeRunAnswer(const Json& summary, std::span<const CheckRecord> checks) {
   const std::string verdict = FindText(summary, "/verdict");

@@ -113,6 +113,37 @@ void LoopChain::Move(const MatrixXd& c, MatrixXd* x) const {
   x->topRows(2 * n_) = (A_ * x->topRows(2 * n_) + B_ * u).eval();
 }
 
+/// Adds the gain margin at L = -1 / factor.
+void AddGain(double factor, StabilityMargins* margins) {
+  if (factor > 1.0) margins->gain = std::min(margins->gain, factor);
+  if (factor < 1.0) margins->least_gain = std::max(margins->least_gain, factor);
+}
+
+/// Adds an end of the frequencies, at rest or half the sampling rate, where L is real.
+void AddEnd(Complex L, StabilityMargins* margins) {
+  if (L.real() < 0.0 && std::abs(L.imag()) < 1e-6 * std::abs(L)) AddGain(1.0 / std::abs(L), margins);
+}
+
+constexpr int kFrequencies = 500;
+constexpr double kLowest = 1e-5;  // of half the rate of sampling
+
+std::vector<double> ListFrequencies(double period) {
+  std::vector<double> w;
+  for (int i = 1; i <= kFrequencies; ++i)
+    w.push_back(kPi / period * std::pow(kLowest, 1.0 - i / double{kFrequencies}));
+  return w;
+}
+
+/// Reorders values so that each continues the one before it.
+void Match(const VectorXcd& before, VectorXcd* values) {
+  for (Index i = 0; i < values->size(); ++i) {
+    Index nearest = i;
+    for (Index k = i + 1; k < values->size(); ++k)
+      if (std::abs((*values)[k] - before[i]) < std::abs((*values)[nearest] - before[i])) nearest = k;
+    std::swap((*values)[i], (*values)[nearest]);
+  }
+}
+
 }  // namespace
 
 SampledSystem CalcSampledSystem(const LinearLoop& loop) {
@@ -145,21 +176,6 @@ void StabilityMargins::Narrow(const StabilityMargins& other) {
   delay = std::min(delay, other.delay);
 }
 
-namespace {
-
-/// Adds the gain margin at L = -1 / factor.
-void AddGain(double factor, StabilityMargins* margins) {
-  if (factor > 1.0) margins->gain = std::min(margins->gain, factor);
-  if (factor < 1.0) margins->least_gain = std::max(margins->least_gain, factor);
-}
-
-/// Adds an end of the frequencies, at rest or half the sampling rate, where L is real.
-void AddEnd(Complex L, StabilityMargins* margins) {
-  if (L.real() < 0.0 && std::abs(L.imag()) < 1e-6 * std::abs(L)) AddGain(1.0 / std::abs(L), margins);
-}
-
-}  // namespace
-
 StabilityMargins FindMargins(const std::vector<double>& w, const std::vector<Complex>& L) {
   StabilityMargins margins;
   for (size_t i = 0; i + 1 < w.size(); ++i) {
@@ -179,30 +195,6 @@ StabilityMargins FindMargins(const std::vector<double>& w, const std::vector<Com
   if (!L.empty()) AddEnd(L.back(), &margins);
   return margins;
 }
-
-namespace {
-
-constexpr int kFrequencies = 500;
-constexpr double kLowest = 1e-5;  // of half the rate of sampling
-
-std::vector<double> ListFrequencies(double period) {
-  std::vector<double> w;
-  for (int i = 1; i <= kFrequencies; ++i)
-    w.push_back(kPi / period * std::pow(kLowest, 1.0 - i / double{kFrequencies}));
-  return w;
-}
-
-/// Reorders values so that each continues the one before it.
-void Match(const VectorXcd& before, VectorXcd* values) {
-  for (Index i = 0; i < values->size(); ++i) {
-    Index nearest = i;
-    for (Index k = i + 1; k < values->size(); ++k)
-      if (std::abs((*values)[k] - before[i]) < std::abs((*values)[nearest] - before[i])) nearest = k;
-    std::swap((*values)[i], (*values)[nearest]);
-  }
-}
-
-}  // namespace
 
 LoopMargins CalcMargins(const SampledSystem& system, bool together) {
   // A - B C = U R U^*

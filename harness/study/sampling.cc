@@ -69,70 +69,6 @@ std::vector<UnitPoint> MakeMorris(int dimensions, long count, std::uint64_t seed
   return points;
 }
 
-}  // namespace
-
-std::vector<UnitPoint> MakeLatinHypercube(int dimensions, long count, std::uint64_t seed) {
-  std::vector<UnitPoint> points = MakePoints(dimensions, count);
-  std::mt19937_64 random(seed);
-  std::vector<size_t> slices(points.size());
-  for (size_t d = 0; d < static_cast<size_t>(dimensions); ++d) {
-    ShuffleNumbers(&slices, &random);
-    for (size_t i = 0; i < points.size(); ++i)
-      points[i][d] = (static_cast<double>(slices[i]) + DrawUnit(&random)) / static_cast<double>(count);
-  }
-  return points;
-}
-
-std::vector<UnitPoint> MakeSobol(int dimensions, long count, std::optional<std::uint64_t> scramble) {
-  Require(dimensions >= 1 && dimensions <= kMaxSobolDimensions, "dimensions", "must be from 1 to 64",
-          dimensions);
-  using Engine = boost::random::sobol_engine<std::uint32_t, 32>;
-  Engine engine(static_cast<size_t>(dimensions));
-  std::vector<std::uint32_t> seeds(static_cast<size_t>(dimensions));
-  std::mt19937_64 random(scramble.value_or(0));
-  for (std::uint32_t& seed : seeds) seed = static_cast<std::uint32_t>(random() >> 32U);
-  std::vector<UnitPoint> points = MakePoints(dimensions, count);
-  for (size_t i = 0; i < points.size(); ++i) {
-    for (size_t d = 0; d < points[i].size(); ++d) {
-      // Boost's sequence leaves the origin out.
-      const std::uint32_t x = i == 0 ? 0 : engine();
-      points[i][d] = static_cast<double>(scramble ? ScrambleDigits(x, seeds[d]) : x) * 0x1p-32;
-    }
-  }
-  return points;
-}
-
-std::vector<UnitPoint> MakeRandom(int dimensions, long count, std::uint64_t seed) {
-  std::vector<UnitPoint> points = MakePoints(dimensions, count);
-  std::mt19937_64 random(seed);
-  for (UnitPoint& point : points) {
-    for (double& x : point) x = DrawUnit(&random);
-  }
-  return points;
-}
-
-std::vector<UnitPoint> MakeUnitPoints(const Sample& sample, int dimensions) {
-  switch (sample.method) {
-    case SamplingMethod::kSobol:
-      return MakeSobol(dimensions, sample.count,
-                       sample.scramble ? std::optional<std::uint64_t>(sample.seed) : std::nullopt);
-    case SamplingMethod::kRandom:
-      return MakeRandom(dimensions, sample.count, sample.seed);
-    case SamplingMethod::kMorris:
-      return MakeMorris(dimensions, sample.count, sample.seed);
-    case SamplingMethod::kLatinHypercube:
-    case SamplingMethod::kGrid:
-      break;
-  }
-  return MakeLatinHypercube(dimensions, sample.count, sample.seed);
-}
-
-long CountUnitPoints(const Sample& sample, int dimensions) {
-  return sample.method == SamplingMethod::kMorris ? sample.count * (dimensions + 1) : sample.count;
-}
-
-namespace {
-
 constexpr double kOutside = 0.025;  // on either side of an interval of 95 %
 constexpr int kResamples = 200;
 constexpr std::uint64_t kBootstrapSeed = 1;
@@ -194,6 +130,66 @@ std::vector<MorrisEffect> CalcMorrisEffects(const std::vector<UnitPoint>& points
 }
 
 }  // namespace
+
+std::vector<UnitPoint> MakeLatinHypercube(int dimensions, long count, std::uint64_t seed) {
+  std::vector<UnitPoint> points = MakePoints(dimensions, count);
+  std::mt19937_64 random(seed);
+  std::vector<size_t> slices(points.size());
+  for (size_t d = 0; d < static_cast<size_t>(dimensions); ++d) {
+    ShuffleNumbers(&slices, &random);
+    for (size_t i = 0; i < points.size(); ++i)
+      points[i][d] = (static_cast<double>(slices[i]) + DrawUnit(&random)) / static_cast<double>(count);
+  }
+  return points;
+}
+
+std::vector<UnitPoint> MakeSobol(int dimensions, long count, std::optional<std::uint64_t> scramble) {
+  Require(dimensions >= 1 && dimensions <= kMaxSobolDimensions, "dimensions", "must be from 1 to 64",
+          dimensions);
+  using Engine = boost::random::sobol_engine<std::uint32_t, 32>;
+  Engine engine(static_cast<size_t>(dimensions));
+  std::vector<std::uint32_t> seeds(static_cast<size_t>(dimensions));
+  std::mt19937_64 random(scramble.value_or(0));
+  for (std::uint32_t& seed : seeds) seed = static_cast<std::uint32_t>(random() >> 32U);
+  std::vector<UnitPoint> points = MakePoints(dimensions, count);
+  for (size_t i = 0; i < points.size(); ++i) {
+    for (size_t d = 0; d < points[i].size(); ++d) {
+      // Boost's sequence leaves the origin out.
+      const std::uint32_t x = i == 0 ? 0 : engine();
+      points[i][d] = static_cast<double>(scramble ? ScrambleDigits(x, seeds[d]) : x) * 0x1p-32;
+    }
+  }
+  return points;
+}
+
+std::vector<UnitPoint> MakeRandom(int dimensions, long count, std::uint64_t seed) {
+  std::vector<UnitPoint> points = MakePoints(dimensions, count);
+  std::mt19937_64 random(seed);
+  for (UnitPoint& point : points) {
+    for (double& x : point) x = DrawUnit(&random);
+  }
+  return points;
+}
+
+std::vector<UnitPoint> MakeUnitPoints(const Sample& sample, int dimensions) {
+  switch (sample.method) {
+    case SamplingMethod::kSobol:
+      return MakeSobol(dimensions, sample.count,
+                       sample.scramble ? std::optional<std::uint64_t>(sample.seed) : std::nullopt);
+    case SamplingMethod::kRandom:
+      return MakeRandom(dimensions, sample.count, sample.seed);
+    case SamplingMethod::kMorris:
+      return MakeMorris(dimensions, sample.count, sample.seed);
+    case SamplingMethod::kLatinHypercube:
+    case SamplingMethod::kGrid:
+      break;
+  }
+  return MakeLatinHypercube(dimensions, sample.count, sample.seed);
+}
+
+long CountUnitPoints(const Sample& sample, int dimensions) {
+  return sample.method == SamplingMethod::kMorris ? sample.count * (dimensions + 1) : sample.count;
+}
 
 Estimate CalcProbability(long failures, long trials) {
   Require(trials > 0 && failures >= 0 && failures <= trials, "failures", "must be among the trials",

@@ -15,6 +15,18 @@ UnitPoint FindStart(const Study& study) {
   return start;
 }
 
+template <typename IsBefore>
+std::vector<const JudgedPoint*> SortFeasibleBy(const std::vector<JudgedPoint>& points, IsBefore is_before) {
+  std::vector<const JudgedPoint*> sorted;
+  for (const JudgedPoint& point : points) {
+    if (point.judgement.is_feasible()) sorted.push_back(&point);
+  }
+  std::ranges::stable_sort(sorted, [&](const JudgedPoint* a, const JudgedPoint* b) {
+    return is_before(a->judgement, b->judgement);
+  });
+  return sorted;
+}
+
 }  // namespace
 
 SearchHistory::SearchHistory(const Study& study)
@@ -105,22 +117,6 @@ std::vector<JudgedPoint> JudgePoints(const Study& study, const std::vector<Trial
   }
   return points;
 }
-
-namespace {
-
-template <typename IsBefore>
-std::vector<const JudgedPoint*> SortFeasibleBy(const std::vector<JudgedPoint>& points, IsBefore is_before) {
-  std::vector<const JudgedPoint*> sorted;
-  for (const JudgedPoint& point : points) {
-    if (point.judgement.is_feasible()) sorted.push_back(&point);
-  }
-  std::ranges::stable_sort(sorted, [&](const JudgedPoint* a, const JudgedPoint* b) {
-    return is_before(a->judgement, b->judgement);
-  });
-  return sorted;
-}
-
-}  // namespace
 
 std::vector<const JudgedPoint*> SortFeasible(const std::vector<JudgedPoint>& points) {
   return SortFeasibleBy(points, IsBetter);

@@ -28,62 +28,6 @@ int WaitForOthers(void* file, int count) {
   return 1;
 }
 
-const std::string& RequirePlain(const std::string& name) {
-  RequirePlainFile(name);
-  return name;
-}
-
-}  // namespace
-
-std::string Explain(const SQLite::Exception& error) {
-  switch (error.getErrorCode()) {
-    case SQLITE_NOTADB:
-    case SQLITE_CORRUPT:
-      return std::string("is not a usable database: ") + error.what();
-    case -1:  // SQLiteCpp's own, about its calls
-      return "is not a usable database: it lacks a row or a column";
-    case SQLITE_CANTOPEN:
-      return "cannot be opened";
-    case SQLITE_READONLY:
-      return "cannot be written: it is read-only";
-    case SQLITE_FULL:
-    case SQLITE_IOERR:
-      return std::string("cannot be written: ") + error.what();
-    case SQLITE_BUSY:
-      return "is locked by another program; the same command goes on where this one ended";
-    default:
-      return error.what();
-  }
-}
-
-/// SQLite gives empty names, those that begin with a colon and URIs a meaning of their own: databases in
-/// memory, or temporary ones.
-void RequirePlainFile(const std::string& name) {
-  const auto refuse = [&](const std::string& why) {
-    throw InputError(Quote(name) + ": a database must be a plain file: " + why);
-  };
-  if (name.empty()) refuse("the name is empty");
-  if (name.starts_with(':')) refuse("the name begins with a colon (a file of this name is ./" + name + ")");
-  if (name.starts_with("file:")) refuse("this is a URI (a file of this name is ./" + name + ")");
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(name, error);
-  if (std::filesystem::is_directory(status)) refuse("this is a folder");
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    refuse("this is a device, a pipe or a socket");
-  }
-}
-
-SqliteFile::SqliteFile(const std::string& name, int flags) try : SQLite
-  ::Database(RequirePlain(name), flags) {
-    sqlite3_busy_handler(getHandle(), WaitForOthers, this);
-    NoteInput(name);
-  }
-catch (const SQLite::Exception& error) {
-  throw InputError(name + ": " + Explain(error));
-}
-
-namespace {
-
 /// Changes with every boot.
 std::string ReadMachine() {
   std::string boot;
@@ -113,6 +57,54 @@ std::string ReadStart(const std::string& pid) {
 }
 
 }  // namespace
+
+std::string Explain(const SQLite::Exception& error) {
+  switch (error.getErrorCode()) {
+    case SQLITE_NOTADB:
+    case SQLITE_CORRUPT:
+      return std::string("is not a usable database: ") + error.what();
+    case -1:  // SQLiteCpp's own, about its calls
+      return "is not a usable database: it lacks a row or a column";
+    case SQLITE_CANTOPEN:
+      return "cannot be opened";
+    case SQLITE_READONLY:
+      return "cannot be written: it is read-only";
+    case SQLITE_FULL:
+    case SQLITE_IOERR:
+      return std::string("cannot be written: ") + error.what();
+    case SQLITE_BUSY:
+      return "is locked by another program; the same command goes on where this one ended";
+    default:
+      return error.what();
+  }
+}
+
+/// SQLite gives empty names, those that begin with a colon and URIs a meaning of their own: databases in
+/// memory, or temporary ones.
+const std::string& RequirePlainFile(const std::string& name) {
+  const auto refuse = [&](const std::string& why) {
+    throw InputError(Quote(name) + ": a database must be a plain file: " + why);
+  };
+  if (name.empty()) refuse("the name is empty");
+  if (name.starts_with(':')) refuse("the name begins with a colon (a file of this name is ./" + name + ")");
+  if (name.starts_with("file:")) refuse("this is a URI (a file of this name is ./" + name + ")");
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(name, error);
+  if (std::filesystem::is_directory(status)) refuse("this is a folder");
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    refuse("this is a device, a pipe or a socket");
+  }
+  return name;
+}
+
+SqliteFile::SqliteFile(const std::string& name, int flags) try : SQLite
+  ::Database(RequirePlainFile(name), flags) {
+    sqlite3_busy_handler(getHandle(), WaitForOthers, this);
+    NoteInput(name);
+  }
+catch (const SQLite::Exception& error) {
+  throw InputError(name + ": " + Explain(error));
+}
 
 std::string NameThisProcess() {
   const std::string pid = std::to_string(::getpid());

@@ -162,6 +162,16 @@ std::string DescribeLimits(const Study& study, const std::vector<TrialRow>& rows
   return text;
 }
 
+/// @param html of the body. @param data that the script draws.
+std::string MakePage(const std::string& title, const char* html, const std::string& data,
+                     const char* script) {
+  return AssemblePage({.title = title,
+                       .styles = {kStudyCss},
+                       .markup = {html},
+                       .data = data,
+                       .scripts = {kChartJs, kChartsJs, script}});
+}
+
 }  // namespace
 
 std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>& rows) {
@@ -243,20 +253,6 @@ std::string DescribeProgress(const StudyStore& store) {
   for (const std::string& finding : ListFindings(study, rows)) text += finding + "\n";
   return text;
 }
-
-namespace {
-
-/// @param html of the body. @param data that the script draws.
-std::string MakePage(const std::string& title, const char* html, const std::string& data,
-                     const char* script) {
-  return AssemblePage({.title = title,
-                       .styles = {kStudyCss},
-                       .markup = {html},
-                       .data = data,
-                       .scripts = {kChartJs, kChartsJs, script}});
-}
-
-}  // namespace
 
 std::string MakeStudyPage(const StudySummary& summary) {
   const auto name = summary.json.at("name").get<std::string>();

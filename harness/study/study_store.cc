@@ -21,6 +21,9 @@ constexpr int kApplicationId = 0x44584353;  // "DXCS", distinguishes a study fro
 /// For reading too the file has to be written: what a killed process left half done must be undone.
 constexpr int kExisting = SQLITE_OPEN_READWRITE;
 
+/// Transactions that may write; undone unless committed.
+constexpr auto kWrites = SQLite::TransactionBehavior::IMMEDIATE;
+
 std::string QuoteName(const std::string& name) {
   std::string quoted = "\"";
   for (const char c : name) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
@@ -107,7 +110,7 @@ void StudyStore::Create(const StudyIdentity& identity, const Study& study) {
     return database_->execAndGet("SELECT count(*) FROM sqlite_master").getInt() == 0;
   };
   if (!is_empty()) return;
-  SqliteTransaction transaction(database_.get());
+  SQLite::Transaction transaction(*database_, kWrites);
   if (!is_empty()) return;  // another process was faster
   database_->exec("PRAGMA application_id = " + std::to_string(kApplicationId));
   std::vector<std::string> columns, texts;
@@ -157,7 +160,7 @@ void StudyStore::AddMissingColumns() {
     return missing;
   };
   if (list_missing().empty()) return;
-  SqliteTransaction transaction(database_.get());
+  SQLite::Transaction transaction(*database_, kWrites);
   // Another process may have been faster.
   for (const std::string& column : list_missing()) database_->exec("ALTER TABLE " + column);
   transaction.commit();
@@ -308,7 +311,7 @@ std::optional<TrialRow> StudyStore::FindRow(long trial) const {
 
 std::vector<long> StudyStore::Claim(const std::vector<long>& trials) {
   return database_->Do([&] {
-    SqliteTransaction transaction(database_.get());
+    SQLite::Transaction transaction(*database_, kWrites);
     const std::string self = NameThisProcess();
     std::vector<long> claimed;
     for (const long trial : trials) {
@@ -352,7 +355,7 @@ void StudyStore::Insert(const TrialRow& row) {
 
 void StudyStore::Add(const std::vector<TrialRow>& rows) {
   database_->Do([&] {
-    SqliteTransaction transaction(database_.get());
+    SQLite::Transaction transaction(*database_, kWrites);
     std::vector<long> numbers;
     for (const TrialRow& row : rows) {
       Insert(row);
@@ -365,7 +368,7 @@ void StudyStore::Add(const std::vector<TrialRow>& rows) {
 
 void StudyStore::AddAll(const std::vector<TrialSource>& sources) {
   database_->Do([&] {
-    SqliteTransaction transaction(database_.get());
+    SQLite::Transaction transaction(*database_, kWrites);
     std::unordered_map<long, const std::string*> added;  // from which source
     for (const TrialSource& source : sources) {
       source.read([&](TrialRow&& row) {

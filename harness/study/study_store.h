@@ -23,9 +23,9 @@
 
 namespace dexcheck {
 
-/// @throws InputError when this cannot be the name of a database file: it must be a regular file, and nothing
-/// else that SQLite would take a name for (nothing that is gone when the process ends).
-void RequirePlainFile(const std::string& name);
+/// Returns the name. @throws InputError when this cannot be that of a database file: it must be a regular
+/// file, and nothing else that SQLite would take a name for (nothing that is gone when the process ends).
+const std::string& RequirePlainFile(const std::string& name);
 
 /// "is locked by another program", of what SQLite threw.
 std::string Explain(const SQLite::Exception& error);
@@ -52,13 +52,6 @@ class SqliteFile : public SQLite::Database {
       throw InputError(getFilename() + ": " + Explain(error));
     }
   }
-};
-
-/// One that may write; undone unless committed.
-class SqliteTransaction : public SQLite::Transaction {
- public:
-  explicit SqliteTransaction(SQLite::Database* database)
-      : SQLite::Transaction(*database, SQLite::TransactionBehavior::IMMEDIATE) {}
 };
 
 // Which of the processes that use it are alive.
@@ -132,12 +125,10 @@ class StudyStore {
   /// Takes trials on for this process. @return those of them that are not done, and that no other living
   /// process of this machine has.
   std::vector<long> Claim(const std::vector<long>& trials);
-  bool Claim(long trial) { return !Claim(std::vector<long>{trial}).empty(); }
   /// Gives claimed trials back undone.
   void Release(const std::vector<long>& trials);
   /// Stores trials and ends their claims, in one transaction. A row that is already there stays.
   void Add(const std::vector<TrialRow>& rows);
-  void Add(const TrialRow& row) { Add(std::vector<TrialRow>{row}); }
   /// All rows in one transaction. Those that are the same as one that is there may be, and failed ones
   /// (IsFailed) give way to others. @throws InputError when one differs; then nothing is added.
   void AddAll(const std::vector<TrialSource>& sources);

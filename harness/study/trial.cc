@@ -217,6 +217,11 @@ class TrialMonitor {
   double peak_torque_ = 0.0, peak_effort_ = 0.0, energy_ = 0.0;
 };
 
+bool IsSameNumber(double a, double b) {
+  return (std::isnan(a) && std::isnan(b)) ||
+         std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
+}
+
 }  // namespace
 
 ScenarioDocument OpenScenario(const StudyInputs& inputs) {
@@ -306,15 +311,6 @@ Metric FindErrorMetric(const std::vector<TrialRow>& rows) {
   });
   return of_joints ? kJointErrorRms : kPositionErrorRms;
 }
-
-namespace {
-
-bool IsSameNumber(double a, double b) {
-  return (std::isnan(a) && std::isnan(b)) ||
-         std::bit_cast<std::uint64_t>(a) == std::bit_cast<std::uint64_t>(b);
-}
-
-}  // namespace
 
 bool IsSame(const TrialRow& a, const TrialRow& b) {
   if (a.trial.seed != b.trial.seed || a.trial.parameters != b.trial.parameters ||

@@ -67,10 +67,10 @@ void Compare(int repetitions) {
     size_t next = first;
     while (next < first + count || !pool.IsEmpty()) {
       while (!pool.IsFull() && next < first + count) {
-        store.Claim(trials[next].number);
+        store.Claim({trials[next].number});
         pool.Start(trials[next++]);
       }
-      if (const auto ended = pool.Wait()) store.Add(ended->row);
+      if (const auto ended = pool.Wait()) store.Add({ended->row});
     }
   };
   // So many trials of one worker against as many bare loops.

@@ -84,14 +84,14 @@ class StudyShapes : public ::testing::TestWithParam<Shape> {
     const Study& study = inputs.study;
     StudyStore store = StudyStore::OpenOrCreate(path(), IdentifyStudy(inputs), study);
     if (!study.is_search()) {
-      for (const Trial& trial : ListTrials(study)) store.Add(MakeRow(trial));
+      for (const Trial& trial : ListTrials(study)) store.Add({MakeRow(trial)});
       return store;
     }
     constexpr int kBatches = 3;
     SearchHistory history(study);
     for (int i = 0; i < kBatches; ++i) {
       for (const Trial& trial : history.ListMissing()) {
-        store.Add(MakeRow(trial));
+        store.Add({MakeRow(trial)});
         history.Add(MakeRow(trial));
       }
     }

@@ -71,8 +71,8 @@ TEST_F(StudyStoreTest, RowsComeBackBitForBit) {
   const TrialRow row = MakeRow(2);
   {
     StudyStore store = Open();
-    store.Add(MakeRow(3));
-    store.Add(row);
+    store.Add({MakeRow(3)});
+    store.Add({row});
   }
   const StudyStore store = StudyStore::Open(folder_.path() / "s.sqlite");
   const std::vector<TrialRow> rows = store.ReadRows();
@@ -107,7 +107,7 @@ TEST_F(StudyStoreTest, AnotherStudyIsRefused) {
 
 // Texts that change no trial may be edited.
 TEST_F(StudyStoreTest, TheDatabaseTakesOverWhatNoRowDependsOn) {
-  Open().Add(MakeRow(0));
+  Open().Add({MakeRow(0)});
   const std::string edited =
       ReplaceOnce(ReplaceOnce(kText, "\"s\"", "\"other\""), "[[vary]]",
                   "# why\ndescription = 'd'\ntrial_time_limit = 3\nmetrics = ['energy']\n"
@@ -121,7 +121,7 @@ TEST_F(StudyStoreTest, TheDatabaseTakesOverWhatNoRowDependsOn) {
 }
 
 TEST_F(StudyStoreTest, AnEditedStudyIsRefusedByItsKey) {
-  Open().Add(MakeRow(0));
+  Open().Add({MakeRow(0)});
   for (const auto& [from, to, key] : {std::tuple{"\"hold\"", "\"offset\"", "scenario"},
                                       {"[[", "controller = \"law.py\"\n[[", "controller"},
                                       {"[[", "set = [\"duration=1\"]\n[[", "set"},
@@ -155,7 +155,7 @@ TEST_F(StudyStoreTest, AnEditedSearchIsRefused) {
 }
 
 TEST_F(StudyStoreTest, AnotherRevisionGoesOnWhenItMakesTheSameRows) {
-  Open().Add(MakeRow(0));
+  Open().Add({MakeRow(0)});
   EXPECT_TRUE(Throws<InputError>([&] { return Open(kText, "r2"); }, "git_revision differs"));
   EXPECT_TRUE(Throws<InputError>(
       [&] { return Open(kText, "r2", [](const std::vector<TrialRow>&) { return false; }); },
@@ -170,8 +170,8 @@ TEST_F(StudyStoreTest, AnotherRevisionGoesOnWhenItMakesTheSameRows) {
 
 // Earlier versions kept rows of an edited study under negative numbers.
 TEST_F(StudyStoreTest, RowsThatWereSetAsideCountNowhere) {
-  Open().Add(MakeRow(0));
-  Open().Add(MakeRow(-1));
+  Open().Add({MakeRow(0)});
+  Open().Add({MakeRow(-1)});
   const StudyStore store = StudyStore::Open(folder_.path() / "s.sqlite");
   EXPECT_EQ(store.ListNumbers(), std::vector<long>{0});
   EXPECT_EQ(store.ReadRows().size(), 1U);
@@ -235,22 +235,22 @@ TEST_F(StudyStoreTest, FailedTrialsGiveWay) {
     EXPECT_EQ(store.ReadRows()[0].result.outcome, Outcome::kSlipped);
 
     crashed.trial.number = 1;
-    store.Add(crashed);
+    store.Add({crashed});
     store.RemoveFailed();
     EXPECT_TRUE(store.FindRow(0));
     EXPECT_FALSE(store.FindRow(1));
-    EXPECT_TRUE(store.Claim(1));
+    EXPECT_FALSE(store.Claim({1}).empty());
   }
 }
 
 TEST_F(StudyStoreTest, DatabasesThatDoNotTellTheMachineAreReadAndContinued) {
   const std::filesystem::path path = folder_.path() / "s.sqlite";
-  Open().Add(MakeRow(0));
+  Open().Add({MakeRow(0)});
   Execute("ALTER TABLE trials DROP COLUMN machine");
   Execute("UPDATE study SET layout = '1'");
   TrialRow row = MakeRow(1);
   row.machine = "this";
-  Open().Add(row);
+  Open().Add({row});
   const std::vector<TrialRow> rows = StudyStore::Open(path).ReadRows();
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_EQ(rows[0].machine, "");
@@ -262,10 +262,10 @@ TEST_F(StudyStoreTest, DatabasesThatDoNotTellTheMachineAreReadAndContinued) {
 
 TEST_F(StudyStoreTest, DatabasesWithoutTheNewestMetricsAreReadAndContinued) {
   const std::filesystem::path path = folder_.path() / "s.sqlite";
-  Open().Add(MakeRow(0));
+  Open().Add({MakeRow(0)});
   for (const char* name : {"joint_error_rms", "joint_error_max"})
     Execute(std::string("ALTER TABLE trials DROP COLUMN ") + name);
-  Open().Add(MakeRow(1));
+  Open().Add({MakeRow(1)});
   const std::vector<TrialRow> rows = StudyStore::Open(path).ReadRows();
   ASSERT_EQ(rows.size(), 2u);
   EXPECT_TRUE(std::isnan(rows[0].result.metrics[kJointErrorRms]));
@@ -290,19 +290,19 @@ TEST_F(StudyStoreTest, OnlyPlainFilesAreDatabases) {
 
 TEST_F(StudyStoreTest, AClaimHoldsAsLongAsItsProcessLives) {
   StudyStore store = Open();
-  EXPECT_TRUE(store.Claim(1));
-  EXPECT_FALSE(Open().Claim(1));
+  EXPECT_FALSE(store.Claim({1}).empty());
+  EXPECT_TRUE(Open().Claim({1}).empty());
   store.Release({1});
-  EXPECT_TRUE(store.Claim(1));
-  store.Add(MakeRow(1));
-  EXPECT_FALSE(store.Claim(1)) << "done";
+  EXPECT_FALSE(store.Claim({1}).empty());
+  store.Add({MakeRow(1)});
+  EXPECT_TRUE(store.Claim({1}).empty()) << "done";
 
   const pid_t child = ::fork();
-  if (child == 0) ::_exit(Open().Claim(2) ? 0 : 1);
+  if (child == 0) ::_exit(Open().Claim({2}).empty() ? 1 : 0);
   int status = -1;
   ::waitpid(child, &status, 0);
   ASSERT_EQ(status, 0);
-  EXPECT_TRUE(store.Claim(2)) << "its process is gone";
+  EXPECT_FALSE(store.Claim({2}).empty()) << "its process is gone";
 }
 
 TEST(ProcessName, KnowsTheLiving) {
