@@ -116,7 +116,7 @@ struct Balance {
 /// plant that is not the engine's; and (19), of the object.
 struct MotionBalance {
   VectorXd q, nu, nu_dot;  ///< Of the robot.
-  /// What they leave with the torques that motors gave, N and N m: the robot's entries of nu, then the force
+  /// Their remainder with the torques that motors gave, N and N m: the robot's entries of nu, then the force
   /// on the object and its moment (Sigma_o), if there is one.
   VectorXd residual;
   VectorXd size;  ///< Sum of the magnitudes that each entry is the sum of.

@@ -1,6 +1,6 @@
 #pragma once
 
-// What the equations of motion leave in some steps, and its explanation.
+// The remainder of the equations of motion in some steps, and its explanation.
 
 #include <initializer_list>
 #include <set>

@@ -1,7 +1,7 @@
 #pragma once
 
-// What the equations of motion leave at a step (MotionBalance), and the columns of faults of size 1 in it,
-// both by entry over its rounding.
+// The remainder of the equations of motion at a step (MotionBalance), and the columns of faults of size 1 in
+// it, both by entry over its rounding.
 
 #include <string>
 #include <vector>

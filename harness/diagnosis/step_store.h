@@ -103,8 +103,8 @@ class StepStore {
   struct Span {
     double first = std::numeric_limits<double>::quiet_NaN(), last = first;
   };
-  /// What equations of motion leave begins or ends at a step: the rows of that step and of the one before,
-  /// and what the residual changes by, less what it changes by at a step beside.
+  /// A step at which part of the residual begins or ends: the rows of that step and of the one before, and
+  /// the residual's change, less that at a step beside.
   struct Jump {
     VectorXd before, after, change;
   };
