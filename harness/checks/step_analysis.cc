@@ -351,8 +351,8 @@ void StepAnalyzer::SetRigidMotion() {
   motion.q = step.reading.state.q;
   motion.nu = step.reading.state.xi;
   motion.nu_dot = step.response.xi_dot;
-  solver_force_ = step.drive.tau - step.response.motor_torques;
-  actuation_.CalcForce(solver_force_, motion.residual.head(n));
+  acceleration_ = step.drive.tau - step.response.motor_torques;
+  actuation_.CalcForce(acceleration_, motion.residual.head(n));
   motion.residual.head(n) += now_.robot.residual;
   // Rounding of equations that are solved together is that of the largest.
   constexpr double kTogether = 1e4;

@@ -247,7 +247,7 @@ class StepAnalyzer {
   std::map<ContactSet, std::unique_ptr<PartialDynamics>> parts_;
   bool was_holding_ = false;  // at the step before
   long steps_ = 0;
-  VectorXd acceleration_;  // n
+  VectorXd acceleration_;  // n, work
   VectorXd least_;         // n, RoundingScales::CalcLeastForces
   VectorXd norm_work_;
 };

@@ -61,14 +61,9 @@ Causes ExplainGeometry(const StepStore& store) {
   return causes;
 }
 
-bool HasOtherShapes(const StepStore& store) {
-  const auto mismatch = store.Get(StepStore::kContactMismatch);
-  return mismatch.size() > 0 && mismatch.cwiseAbs().maxCoeff() > kFaintest;
-}
-
 Causes ExplainContacts(const StepStore& store) {
-  if (!HasOtherShapes(store)) return {};
   const auto mismatch = store.Get(StepStore::kContactMismatch);
+  if (mismatch.size() == 0 || !(mismatch.cwiseAbs().maxCoeff() > kFaintest)) return {};
   const double size = mismatch.cwiseAbs().maxCoeff();
   const double noise = kDistanceNoise + kRadiusAccuracy * size;
   const std::vector<Candidate> candidates =

@@ -1,9 +1,6 @@
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
-#include "controller/model/platform.h"
-#include "harness/diagnosis/run_causes.h"
 #include "harness/diagnosis/step_forces.h"
 
 namespace dexcheck {

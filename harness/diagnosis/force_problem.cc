@@ -98,11 +98,14 @@ void ForceProblem::SetTimes(const CauseTerm& term, Explanation* one) const {
 }
 
 bool ForceProblem::ExplainJoint(const CauseSelection& selection, Causes* causes) const {
-  if (selection.terms.size() < 2 || is_exact_) return false;
+  // What stops a joint softly is exactly a spring, friction and armature.
+  const size_t fewest = is_exact_ ? 3 : 2;
+  if (selection.terms.size() < fewest) return false;
   const std::string& place = candidates_[selection.terms.front().candidate].place;
   const bool is_of_one =
       std::all_of(selection.terms.begin(), selection.terms.end(),
                   [&](const CauseTerm& term) { return candidates_[term.candidate].place == place; });
+  if (is_exact_ && !is_of_one) return false;
   for (const Free& torque : FitAll({"torque"})) {
     const bool leaves_noise = torque.residual.squaredNorm() <= static_cast<double>(y_.size());
     const bool is_joint = is_of_one && candidates_[torque.candidate].place == place;
@@ -138,7 +141,7 @@ void ForceProblem::ExplainChanging(Causes* causes) const {
 
 std::vector<ForceProblem::Free> ForceProblem::FitAll(std::initializer_list<const char*> faults) const {
   std::vector<Free> all;
-  for (size_t i = 0; i < candidates_.size(); ++i)
+  for (size_t i = 0; i < constant_; ++i)
     if (std::ranges::find(faults, candidates_[i].fault) != faults.end()) all.push_back(FitFree(i));
   std::ranges::stable_sort(all, {}, &Free::criterion);
   return all;

@@ -36,8 +36,9 @@ class ForceProblem {
   void ExplainChanging(Causes* causes) const;
 
  private:
-  /// Several faults of one joint may be anything that acts there. So may several of other places, where they
-  /// leave more than rounding and a torque of one joint, free at each step, does not.
+  /// Several faults of one joint may be anything that acts there; two that leave only rounding are these. So
+  /// may several of other places, where they leave more than rounding and a torque of one joint, free at each
+  /// step, does not.
   bool ExplainJoint(const CauseSelection& selection, Causes* causes) const;
   /// A candidate whose amplitudes are free at each step.
   struct Free {

@@ -7,7 +7,6 @@
 
 #include "harness/diagnosis/search_limit.h"
 #include "harness/diagnosis/signal_causes.h"
-#include "harness/diagnosis/step_forces.h"
 
 namespace dexcheck {
 namespace {
@@ -95,7 +94,7 @@ Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions&
   for (const auto explain : {ExplainSignals, ExplainLaw, ExplainContacts, ExplainGeometry})
     add(explain, store);
   add(ExplainRolling, store.GetBefore(void_from));
-  if (store.misplaced().empty() && !store.has_misplaced_wheel()) add(ExplainForces, store);
+  if (store.misplaced().empty()) add(ExplainForces, store);
   if (stopped != nullptr) *stopped = limit.has_ended();
   DropImpossible(store, &causes);
   std::stable_sort(causes.begin(), causes.end(),

@@ -18,9 +18,7 @@ Causes ExplainRolling(const StepStore& store);
 /// Names links that the plant has elsewhere than the model.
 Causes ExplainGeometry(const StepStore& store);
 
-/// Whether fingertips and object touch at another distance than the declared ones, and the shapes that
-/// explain it.
-bool HasOtherShapes(const StepStore& store);
+/// Names the shapes by which fingertips and object touch at another distance than the declared ones.
 Causes ExplainContacts(const StepStore& store);
 
 /// Explains what the equations of motion of the whole robot and its object leave with the plant's

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <optional>
 
-#include "harness/checks/check_table.h"
 #include "harness/engine/map_vector.h"
 
 namespace dexcheck {
@@ -62,6 +61,7 @@ StepStore::StepStore(const Setup& setup, JudgedLaw* law, double rolling_bound)
   row_.resize(offsets_[kSignalCount]);
   recent_.resize(offsets_[kSignalCount], kRecent);
   changes_.resize(entries, kRecent);
+  noise_.resize(entries);
   apart_.resize(2, kRecent);
   jumps_.resize(kMostJumps, {row_, row_, VectorXd(entries)});
   Reset();
@@ -245,12 +245,11 @@ void StepStore::Watch(const Eigen::Ref<const VectorXd>& row) {
 
 Vector2d StepStore::CalcApart(Eigen::Index step) const {
   const Eigen::Index robot = moving_model_.num_velocities(), at = step % kRecent;
-  const VectorXd& noise = noise_;
   Vector2d apart = Vector2d::Constant(std::numeric_limits<double>::infinity());
   // A push that grows evenly changes as one of its neighbours does, even where it begins, or between two
   // jumps.
   for (const Eigen::Index other : {step - 2, step - 1, step + 1, step + 2}) {
-    const auto change = (changes_.col(at) - changes_.col(other % kRecent)).cwiseQuotient(noise);
+    const auto change = (changes_.col(at) - changes_.col(other % kRecent)).cwiseQuotient(noise_);
     const Eigen::Index object = change.size() - robot;
     const Vector2d size(
         change.head(robot).squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, robot)),
@@ -268,7 +267,7 @@ void StepStore::WatchJumps(const Eigen::Ref<const VectorXd>& row) {
   const auto at = [](Eigen::Index step) { return step % kRecent; };
   const Eigen::Index now = num_recent_++;
   recent_.col(at(now)) = row;
-  noise_ = CalcNoise(row);
+  CalcNoise(row, &noise_);
   changes_.col(at(now)).setZero();
   if (now > 0) {
     changes_.col(at(now)) = Part(row, kResidual) - Part(recent_.col(at(now - 1)), kResidual);
@@ -350,6 +349,13 @@ void StepStore::Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row) 
   }
   block_[static_cast<size_t>(size_)] = block;
   data_.col(size_++) = row;
+}
+
+void StepStore::CalcNoise(const Eigen::Ref<const VectorXd>& row, VectorXd* noise) const {
+  *noise = (rounding_ * Part(row, kSize)).cwiseMax(std::numeric_limits<double>::min());
+  const int wheels = moving_model_.num_joints() - setup_->model().num_joints();
+  if (has_misplaced_wheel_)
+    noise->head(moving_model_.num_base_velocities() + wheels).fill(std::numeric_limits<double>::infinity());
 }
 
 StepStore StepStore::GetBefore(double time) const {

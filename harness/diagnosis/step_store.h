@@ -84,9 +84,13 @@ class StepStore {
     return row.segment(offsets_[signal], offsets_[signal + 1] - offsets_[signal]);
   }
   [[nodiscard]] auto Row(Eigen::Index step) const { return data_.col(step); }
-  /// Rounding of each entry of a row's residual: of its summands, or the scenario's tolerance.
+  /// Rounding of each entry of a row's residual: of its summands, or the scenario's tolerance. Infinite for
+  /// base and wheels where one of these stands elsewhere: of another size, it stands higher.
+  void CalcNoise(const Eigen::Ref<const VectorXd>& row, VectorXd* noise) const;
   [[nodiscard]] VectorXd CalcNoise(const Eigen::Ref<const VectorXd>& row) const {
-    return (rounding_ * Part(row, kSize)).cwiseMax(std::numeric_limits<double>::min());
+    VectorXd noise;
+    CalcNoise(row, &noise);
+    return noise;
   }
   /// Whether forces of a row were judged.
   [[nodiscard]] bool HasForces(const Eigen::Ref<const VectorXd>& row) const {
@@ -123,8 +127,6 @@ class StepStore {
     double turn = 0.0;                   ///< rad
   };
   [[nodiscard]] const std::vector<Misplaced>& misplaced() const { return misplaced_; }
-  /// Whether the plant has a wheel elsewhere on the platform: of another size, it stands higher.
-  [[nodiscard]] bool has_misplaced_wheel() const { return has_misplaced_wheel_; }
   /// Residual of the check `rolling`, m/s.
   [[nodiscard]] double rolling_bound() const { return rolling_bound_; }
   [[nodiscard]] JudgedLaw* law() const { return law_; }

@@ -100,6 +100,19 @@ TEST(DrawnFault, NothingIsNamedBesideContactsThatSlideAndASolverThatStops) {
 }
 
 // Two wheels that are off by different amounts are two faults.
+TEST(DrawnFault, OfAHiddenLimitNoFrictionAndNoSpringAreNamed) {
+  RunMutationOptions options = DrawOf(40, 1, {"joint"});
+  options.seed = 5;
+  RunCampaign campaign = MakeCampaign(options, "curve");
+  const auto is_limit = [](const RunMutant& mutant) {
+    return mutant.all.name.find("a hidden limit") != std::string::npos;
+  };
+  const std::vector<const RunMutant*> limits = RunChosen(&campaign, is_limit);
+  for (const RunMutant* mutant : limits)
+    EXPECT_EQ(mutant->score.wrong, 0) << mutant->all.name << ": " << mutant->causes;
+  EXPECT_GE(limits.size(), 3U);
+}
+
 TEST(DrawnFault, AreTheRadiiOfBothWheels) {
   RunCampaign campaign = MakeCampaign(DrawOf(8, 2, {"wheels"}));
   const auto are_radii = [](const RunMutant& mutant) {
