@@ -64,12 +64,11 @@ std::vector<Body> ListBodies(const std::vector<Turns>& turns, const std::vector<
 /// The body of a force at a point, in the steps in which that acts.
 Body FindBody(const std::vector<Turns>& turns, const std::vector<Candidate>& candidates,
               const ForceAtPoint& force) {
-  for (Body& body : ListBodies(turns, candidates)) {
-    if (body.force->place != force.place) continue;
-    body.within = force.within;
-    return body;
-  }
-  return {};
+  const std::vector<Body> bodies = ListBodies(turns, candidates);
+  Body body = *std::ranges::find(
+      bodies, force.place, [](const Body& one) -> const auto& { return one.force->place; });
+  body.within = force.within;
+  return body;
 }
 
 Candidate MakeCandidate(const Body& body, const Vector3d& p) {

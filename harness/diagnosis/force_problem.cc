@@ -98,7 +98,7 @@ void ForceProblem::SetTimes(const CauseTerm& term, Explanation* one) const {
 }
 
 bool ForceProblem::ExplainJoint(const CauseSelection& selection, Causes* causes) const {
-  // What stops a joint softly is exactly a spring, friction and armature.
+  // A soft stop of a joint is exactly a spring, friction and armature.
   const size_t fewest = is_exact_ ? 3 : 2;
   if (selection.terms.size() < fewest) return false;
   const std::string& place = candidates_[selection.terms.front().candidate].place;

@@ -76,10 +76,11 @@ void StepStore::NameReadings() {
   };
   const std::string platform = "base " + base.link;
   constexpr const char* kAxes[] = {"x", "y", "z"};
-  for (int i = 0; i < model.num_base_positions(); ++i) {
+  const int base_positions = model.num_base_positions();
+  for (int i = 0; i < base_positions; ++i) {
     constexpr const char* kPlanar[] = {"x", "y", "heading"};
-    add(platform, model.num_base_positions() == 3 ? kPlanar[i] : "coordinate " + std::to_string(i),
-        i == 2 ? "rad" : "m", "base positions");
+    add(platform, base_positions == 3 ? kPlanar[i] : "coordinate " + std::to_string(i), i == 2 ? "rad" : "m",
+        "base positions");
   }
   const bool turns = base.type == BaseType::kDifferentialDrive && base.velocity == DriveVelocity::kWheelRates;
   for (size_t j = 0; j < model.joints().size(); ++j) {
