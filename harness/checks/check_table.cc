@@ -120,7 +120,7 @@ const CheckInfo kChecks[] = {
      {0.0, "copied, or computed twice from the same numbers"},
      "measured state against the true one, beyond what the scenario declares",
      {Cause::kSensing, Rank::kMeasurement, kOwn},
-     {EvaluateMeasurement, kRunning | kUnsent}},
+     {EvaluateMeasurement, kAlways | kUnsent}},
     {{"law_torque", kLaw, "1"},
      {kLawTorqueBound,
       "rounding of the terms, 1e-15, through Gram matrices of condition number^2; the condition number is "
@@ -449,6 +449,11 @@ std::string DescribeWhatHolds(std::span<const CheckRecord> checks) {
 const CheckInfo* FindCheck(std::string_view name) {
   const auto* const found = std::ranges::find(kChecks, name, &CheckInfo::name);
   return found == std::end(kChecks) ? nullptr : found;
+}
+
+bool HoldsAlways(const CheckRecord& check) {
+  const CheckInfo* info = FindCheck(check.name);
+  return info != nullptr && check.kind != CheckCategory::kAssumption && info->meaning.rank != Rank::kResidual;
 }
 
 }  // namespace dexcheck

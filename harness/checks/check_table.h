@@ -132,6 +132,10 @@ std::span<const CheckInfo> ListChecks();
 /// The entry of that name; null for checks of the model.
 const CheckInfo* FindCheck(std::string_view name);
 
+/// Whether a check of the motion holds at every step of a right run, while everything settles, too.
+/// Assumptions and expectations need not.
+bool HoldsAlways(const CheckRecord& check);
+
 /// Describes what holds of a run whose checks passed, by the evaluated checks that are evidence: "model, law,
 /// inverse and forward dynamics, assumptions hold at every step"; then what was not judged.
 [[nodiscard]] std::string DescribeWhatHolds(std::span<const CheckRecord> checks);

@@ -101,13 +101,17 @@ std::vector<Entry> ListFaults(const Causes& causes, std::span<const CheckRecord>
 }
 
 /// Adds one fact of each cause that no fault explains; of two checks of one fact the sharper one states it.
+/// Where a link or wheel is elsewhere, so are its contacts.
 void AddFacts(std::span<const CheckRecord> steps, std::vector<Entry>* entries) {
   const double void_from = FindVoid(steps);
+  const bool is_misplaced = std::ranges::any_of(
+      *entries, [](const Entry& entry) { return entry.one.channel == CauseChannel::kGeometry; });
   for (const CheckRecord& check : steps) {
     const FailureMeaning meaning = MeaningOf(check.name);
     if (!check.failed || meaning.cause == Cause::kNone || FindFailed(steps, meaning.sharper) != nullptr)
       continue;
-    if (check.name == "rolling" && check.failed_at >= void_from) continue;
+    if (check.name == "rolling" && (is_misplaced || check.failed_at >= void_from)) continue;
+    if (meaning.cause == Cause::kContactGeometry && is_misplaced) continue;
     const Entry fact = MakeFact(check, meaning);
     const auto same = std::find_if(entries->begin(), entries->end(),
                                    [&](const Entry& other) { return other.meaning.cause == meaning.cause; });
@@ -214,7 +218,9 @@ bool AttributeModel(const ConstantChecks& constants, std::span<const CheckRecord
       if (check.failed && (first == nullptr || check.failed_at < first->failed_at)) first = &check;
     if (first == nullptr || FindFailed(steps, "measurement") != nullptr) return false;
     result->evidence = Describe(*first);
-    causes->insert(causes->begin(), MakeFact(*first, {.cause = Cause::kModel}).one);
+    const auto explains = [](const Explanation& one) { return one.channel == CauseChannel::kGeometry; };
+    if (std::stable_partition(causes->begin(), causes->end(), explains) == causes->begin())
+      causes->insert(causes->begin(), MakeFact(*first, {.cause = Cause::kModel}).one);
   }
   // The law is judged by the engine's terms, and goes by the model's.
   std::erase_if(*causes, [](const Explanation& one) { return one.channel == CauseChannel::kLaw; });

@@ -40,16 +40,15 @@ std::vector<Candidate> ListShapes(const Setup& setup, Index tips, Index steps, d
 
 Causes ExplainGeometry(const StepStore& store) {
   constexpr double kRounding = 1e-10;  // m and rad
-  const RobotModel& model = store.setup().model();
   Causes causes;
   for (const StepStore::Misplaced& one : store.misplaced()) {
     const double offset = one.offset.norm(), turn = RadToDeg(one.turn);
-    const std::string on = " on link " + model.link_name(model.joint(one.link).parent);
+    const std::string on = " on " + one.parent;
     Explanation& cause = causes.emplace_back();
     cause.channel = CauseChannel::kGeometry;
     cause.from = one.from;
     cause.fraction = 1.0;
-    Fault fault{"turned" + on + " by", "link " + model.link_name(one.link), turn, 0.0, "deg", ""};
+    Fault fault{"turned" + on + " by", one.place, turn, 0.0, "deg", ""};
     if (offset > kRounding) {
       fault.fault = "off its place" + on + " by";
       fault.value = offset, fault.unit = "m",

@@ -91,10 +91,13 @@ Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions&
     Causes found = explain(from);
     std::move(found.begin(), found.end(), std::back_inserter(causes));
   };
-  for (const auto explain : {ExplainSignals, ExplainLaw, ExplainContacts, ExplainGeometry})
-    add(explain, store);
-  add(ExplainRolling, store.GetBefore(void_from));
-  if (store.misplaced().empty()) add(ExplainForces, store);
+  add(ExplainGeometry, store);
+  add(ExplainSignals, store);
+  // The law is judged at contacts that are elsewhere, too.
+  if (!store.has_misplaced_link() || store.setup().fingertips().empty()) add(ExplainLaw, store);
+  add(ExplainContacts, store);
+  if (store.misplaced().empty()) add(ExplainRolling, store.GetBefore(void_from));
+  if (!store.has_misplaced_link()) add(ExplainForces, store);
   if (stopped != nullptr) *stopped = limit.has_ended();
   DropImpossible(store, &causes);
   std::stable_sort(causes.begin(), causes.end(),

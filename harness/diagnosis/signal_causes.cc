@@ -5,10 +5,12 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <string_view>
 #include <utility>
 
 #include "controller/model/platform.h"
 #include "harness/diagnosis/signal_fit.h"
+#include "harness/engine/engine.h"
 
 namespace dexcheck {
 namespace {
@@ -197,6 +199,18 @@ VectorXd FindPositions(const StepStore& store, Index velocity) {
   return store.Get(StepStore::kPosition).row(model.position_index(joint));
 }
 
+/// Returns the coarsest steps of torque that the motor of a joint may have: of a drive with 7 bits and a
+/// sign.
+double FindCoarsestStep(const mjModel& engine, std::string_view motor) {
+  constexpr double kFewest = 100.0;  // steps up to the limit
+  for (int i = 0; i < engine.nu; ++i) {
+    const bool is_it = engine.actuator_ctrllimited[i] != 0 && engine.actuator_trntype[i] == mjTRN_JOINT &&
+                       motor.ends_with(" " + NameOf(engine, mjOBJ_JOINT, engine.actuator_trnid[2 * i]));
+    if (is_it) return std::abs(engine.actuator_ctrlrange[2 * i + 1] * engine.actuator_gear[6 * i]) / kFewest;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
 std::vector<SignalSeries> ListSeries(const StepStore& store, bool motors) {
   // A step that a motor refuses has no torques.
   const bool is_refused =
@@ -225,6 +239,7 @@ std::vector<SignalSeries> ListSeries(const StepStore& store, bool motors) {
     one.expected = expected.row(i);
     one.got = got.row(i);
     if (motors) one.rate = motor_rates.row(i);
+    if (motors) one.coarsest = FindCoarsestStep(store.setup().engine(), one.name.place);
     if (motors && i >= model.num_base_velocities()) one.position = FindPositions(store, i).head(count);
     if (one.name.group == "joint positions") one.position = one.expected;
     const StepStore::Span span =

@@ -19,6 +19,8 @@ struct SignalSeries {
   VectorXd rate, position;        ///< Of what it moves; empty for none.
   std::vector<bool> has_history;  ///< Whether the steps before each are those before it here.
   double noise = 0.0;             ///< Rounding of got - expected.
+  /// Torque of a motor that has no finer steps: a hundredth of its limit, N m or N.
+  double coarsest = std::numeric_limits<double>::infinity();
   /// When it differs first and last, of all steps, s; NaN where these steps alone show it.
   double from = std::numeric_limits<double>::quiet_NaN(), to = from;
   /// In units of the noise: the least error that a cause is looked for, and the most that an explanation may

@@ -171,7 +171,9 @@ class ShapeList {
   void AddOneStep() {
     constexpr double kCoarsest = 2.0 * kPi / 1024.0;  // rad or m, of the coarsest encoders of robots' joints
     const double least = 2.0 * (got_ - u_).abs().maxCoeff();
-    if (std::abs(got_[0]) < least || (series_.name.group == "joint positions" && least > kCoarsest)) return;
+    const bool is_coarse =
+        series_.name.group == "joint positions" ? least > kCoarsest : std::abs(got_[0]) > series_.coarsest;
+    if (std::abs(got_[0]) < least || is_coarse) return;
     Add("rounding to steps of", series_.name.unit, std::abs(got_[0]), false);
   }
 

@@ -136,7 +136,7 @@ void StepStore::Reset() {
   motor_spans_.assign(motors_.size(), {});
   reading_spans_.assign(readings_.size(), {});
   misplaced_.clear();
-  has_misplaced_wheel_ = false;
+  misplaced_wheels_ = 0;
   largest_torque_ = 0.0;
 }
 
@@ -308,7 +308,7 @@ void StepStore::FindMisplaced(const StepRecord& step) {
   std::copy_n(plant.qpos.data(), engine.nq, kinematics_->qpos);
   mj_kinematics(&engine, kinematics_.get());
   // Offset (m) and turn (rad) of a body in its parent's axes, beyond rounding.
-  const auto find = [&](int body, int parent) {
+  const auto find = [&](int body, int parent, const std::string& name) {
     const auto place = [&](const mjtNum* positions, const mjtNum* rotations) {
       const Pose X = MapPose(rotations + 9 * parent, positions + 3 * parent);
       return X.inverse(Eigen::Isometry) * MapPose(rotations + 9 * body, positions + 3 * body);
@@ -319,21 +319,22 @@ void StepStore::FindMisplaced(const StepRecord& step) {
     const double turn = Eigen::AngleAxisd(Matrix3d(actual.linear() * declared.linear().transpose())).angle();
     constexpr double kRounding = 1e-10;  // m and rad
     const bool differs = offset.norm() > kRounding || turn > kRounding;
-    return differs ? std::optional<Misplaced>({-1, step.time, offset, turn}) : std::nullopt;
+    if (differs)
+      misplaced_.push_back({name, "link " + NameOf(engine, mjOBJ_BODY, parent), step.time, offset, turn});
   };
   const std::vector<int>& bodies = setup_->adapter().link_bodies();
   for (int link = 0; link < setup_->model().num_joints(); ++link) {
     const int body = bodies[static_cast<size_t>(link + 1)];
     const int parent = bodies[static_cast<size_t>(setup_->model().joint(link).parent + 1)];
     if (body < 0 || parent < 0) continue;
-    if (std::optional<Misplaced> found = find(body, parent)) {
-      found->link = link;
-      misplaced_.push_back(*found);
-    }
+    find(body, parent, "link " + setup_->model().link_name(link));
   }
-  for (const EngineWheel& wheel : setup_->adapter().wheels())
-    has_misplaced_wheel_ =
-        has_misplaced_wheel_ || (bodies[0] >= 0 && find(engine.jnt_bodyid[wheel.joint], bodies[0]));
+  const size_t links = misplaced_.size();
+  for (const EngineWheel& wheel : setup_->adapter().wheels()) {
+    const int body = engine.jnt_bodyid[wheel.joint];
+    if (bodies[0] >= 0) find(body, bodies[0], "wheel " + NameOf(engine, mjOBJ_BODY, body));
+  }
+  misplaced_wheels_ = misplaced_.size() - links;
 }
 
 void StepStore::Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row) {
@@ -355,7 +356,7 @@ void StepStore::Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row) 
 void StepStore::CalcNoise(const Eigen::Ref<const VectorXd>& row, VectorXd* noise) const {
   *noise = (rounding_ * Part(row, kSize)).cwiseMax(std::numeric_limits<double>::min());
   const int wheels = moving_model_.num_joints() - setup_->model().num_joints();
-  if (has_misplaced_wheel_)
+  if (misplaced_wheels_ > 0)
     noise->head(moving_model_.num_base_velocities() + wheels).fill(std::numeric_limits<double>::infinity());
 }
 

@@ -118,15 +118,17 @@ class StepStore {
   }
   [[nodiscard]] const std::vector<Span>& motor_spans() const { return motor_spans_; }
   [[nodiscard]] const std::vector<Span>& reading_spans() const { return reading_spans_; }
-  /// A link that the plant has elsewhere on its parent than the engine's model: by its index, and how far, in
-  /// the parent's axes.
+  /// A link, or a wheel of the base, that the plant has elsewhere on its parent than the engine's model: how
+  /// far, in the parent's axes.
   struct Misplaced {
-    int link = 0;
+    std::string place, parent;           ///< "link r_palm", "wheel wheel_left".
     double from = 0.0;                   ///< s
     Vector3d offset = Vector3d::Zero();  ///< m
     double turn = 0.0;                   ///< rad
   };
   [[nodiscard]] const std::vector<Misplaced>& misplaced() const { return misplaced_; }
+  /// Whether a link is among them, and not only wheels.
+  [[nodiscard]] bool has_misplaced_link() const { return misplaced_.size() > misplaced_wheels_; }
   /// Residual of the check `rolling`, m/s.
   [[nodiscard]] double rolling_bound() const { return rolling_bound_; }
   [[nodiscard]] JudgedLaw* law() const { return law_; }
@@ -164,7 +166,7 @@ class StepStore {
   std::vector<Span> motor_spans_, reading_spans_;
   std::shared_ptr<mjData> kinematics_;  // of the engine's model
   std::vector<Misplaced> misplaced_;
-  bool has_misplaced_wheel_ = false;
+  size_t misplaced_wheels_ = 0;  // of these
   // The last steps with forces, by their number modulo kRecent: rows, changes of the residual since the step
   // before, CalcApart.
   MatrixXd recent_, changes_, apart_;

@@ -1,5 +1,6 @@
 #include "harness/run/closed_loop.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <stdexcept>
@@ -69,8 +70,8 @@ void ClosedLoop::CheckMovingStart() const {
 
 bool ClosedLoop::Settle(const std::function<bool()>& should_stop) {
   const auto rest = MakeLineTrajectory(setup_->start().X_o, Vector6d::Zero(), 0.0);
-  if (!SettleOn(*rest, setup_->scenario().settle, should_stop)) return false;
   const bool moving = setup_->scenario().start == Start::kMoving;
+  if (!SettleOn(*rest, setup_->scenario().settle, moving ? -kSettleMoving : 0.0, should_stop)) return false;
   if (moving && !StartMoving(trajectory_->Evaluate(0.0).X_d_dot.head<3>(), should_stop)) return false;
   if (trajectory_) controller_->Follow(*trajectory_);
   if (checks_) checks_->FollowMotion(nullptr, 0.0);
@@ -92,18 +93,18 @@ void ClosedLoop::BeginRun() {
   }
 }
 
-bool ClosedLoop::SettleOn(const Trajectory& motion, double duration,
+bool ClosedLoop::SettleOn(const Trajectory& motion, double duration, double end,
                           const std::function<bool()>& should_stop) {
   const double dt = plant_->time_step();
   const long count = std::lround(duration / dt);
   const long grip = std::lround(kFindsGrip / dt);
   controller_->Follow(motion);
-  if (checks_) checks_->FollowMotion(&motion, -duration);
+  if (checks_) checks_->FollowMotion(&motion, end - duration);
   ForgetSteps();
   for (long i = 0; i < count; ++i) {
     if (should_stop()) return false;
     const double t = static_cast<double>(i) * dt;
-    record_.time = t - duration;
+    record_.time = end - duration + t;
     MakeStep(t);
     if (checks_) checks_->JudgeEffort(record_, t);
     if (checks_) record_.true_model = &checks_->Follow(record_);
@@ -140,7 +141,7 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
   if (checks_) checks_->AddVelocity(v);
   Vector6d velocity = Vector6d::Zero();
   velocity.head<3>() = v;
-  if (!SettleOn(*MakeLineTrajectory(setup_->start().X_o, velocity, 0.0), kSettleMoving, should_stop))
+  if (!SettleOn(*MakeLineTrajectory(setup_->start().X_o, velocity, 0.0), kSettleMoving, 0.0, should_stop))
     return false;
   // The robot moves back to where it began: all places of a level floor are the same.
   const double dt = plant_->time_step();
@@ -153,7 +154,10 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
 
 void ClosedLoop::ForgetSteps() {
   if (!checks_) return;
+  const size_t before = checks_->settling_failures().size();
   checks_->Reset();
+  if (!settling_store_ && std::ranges::any_of(checks_->settling_failures().subspan(before), HoldsAlways))
+    settling_store_ = *store_;
   store_->Reset();
 }
 

@@ -82,6 +82,10 @@ class ClosedLoop {
   [[nodiscard]] const RunChecks& checks() const { return checks_.value(); }
   /// The steps that differ. Only when checking.
   [[nodiscard]] const StepStore& store() const { return store_.value(); }
+  /// Those of settling, if a check failed there that always holds; null otherwise.
+  [[nodiscard]] const StepStore* settling_store() const {
+    return settling_store_ ? &*settling_store_ : nullptr;
+  }
   /// The controller of a task; null unless the scenario is one.
   [[nodiscard]] const PickAndPlaceController* task() const { return task_; }
   [[nodiscard]] const LoopTimes& times() const { return times_; }
@@ -94,7 +98,9 @@ class ClosedLoop {
  private:
   void CheckMovingStart() const;
   bool StartMoving(const Vector3d& v, const std::function<bool()>& should_stop);
-  bool SettleOn(const Trajectory& motion, double duration, const std::function<bool()>& should_stop);
+  /// @param end of settling, s.
+  bool SettleOn(const Trajectory& motion, double duration, double end,
+                const std::function<bool()>& should_stop);
   void BeginRun();
   /// Makes ControlStep as far as it comes.
   void MakeStep(double t);
@@ -121,7 +127,7 @@ class ClosedLoop {
   MotorDrive drive_;
   Disturbances disturbances_;
   std::optional<RunChecks> checks_;
-  std::optional<StepStore> store_;
+  std::optional<StepStore> store_, settling_store_;
   std::unique_ptr<Trajectory> trajectory_;  // null for a task or a motion of joints
   StepRecord record_;
   std::function<void(const StepRecord&)> observe_;

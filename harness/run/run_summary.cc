@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "controller/common/text.h"
 #include "harness/base/bounded_json.h"
@@ -97,6 +98,17 @@ void AddCauses(const Json& causes, Answer* answer) {
   if (has_several) answer->remarks.emplace_back("another motion may separate the causes joined by \"or\"");
 }
 
+/// The checks of the motion. Those that always hold stand first if they failed while everything settled and
+/// not since: how the run began follows from that.
+std::vector<CheckRecord> ListJudged(const RunChecks& checks) {
+  std::vector<CheckRecord> judged;
+  const auto fails = [](const CheckRecord& check) { return check.failed && HoldsAlways(check); };
+  if (std::ranges::none_of(checks.motion_checks(), fails))
+    std::ranges::copy_if(checks.settling_failures(), std::back_inserter(judged), HoldsAlways);
+  std::ranges::copy(checks.motion_checks(), std::back_inserter(judged));
+  return judged;
+}
+
 /// Returns whether a motor is one that a run cannot drive.
 bool HasServos(const Json& checks) {
   for (const auto& [name, check] : checks.items())
@@ -142,9 +154,11 @@ void AddLimits(const StepRecord& step, double dt, std::vector<LimitedTorque>* li
 
 void Judge(const Setup& setup, const ClosedLoop& loop, const SearchOptions& search, RunResult* result) {
   if (loop.is_checking()) {
-    const std::span<const CheckRecord> steps = loop.checks().motion_checks();
+    const std::vector<CheckRecord> steps = ListJudged(loop.checks());
+    const bool is_before = steps.size() > loop.checks().motion_checks().size();
     bool stopped = false;
-    result->causes = ExplainRun(loop.store(), FindVoid(steps), search, &stopped);
+    result->causes =
+        ExplainRun(is_before ? *loop.settling_store() : loop.store(), FindVoid(steps), search, &stopped);
     result->attribution = Attribute(setup.constants(), loop.checks().model_checks(), steps,
                                     loop.checks().context(), &result->causes);
     if (stopped && result->attribution.cause != Cause::kNone)

@@ -98,6 +98,26 @@ TEST(HiddenSensorFault, IsToldFromItsFirstStepToItsLast) {
   EXPECT_TRUE(late.ends);
 }
 
+// It is over when the run begins, and what it did to the robot is not the law's fault.
+TEST(HiddenSensorFault, WhileEverythingSettlesIsToldWithItsTimes) {
+  const ShippedRun run("panda-reach", {"duration=0.1", "settle=0.5", "expect.from=0", "expect.joints=1e-9"});
+  LoopParts parts = MakeLoopParts(run.setup());
+  parts.hidden_sensor_fault = [](double t, MeasuredState* state) {
+    if (t > 0.2005 && t < 0.3005) state->q[3] += 1e-4;
+  };
+  Runner runner(run.setup(), /*check=*/true, std::move(parts));
+  const RunResult& result = runner.Run([](const StepRecord&) {}, [] { return false; });
+  EXPECT_TRUE(runner.loop().checks().Find("expect_joints").failed);
+  EXPECT_EQ(result.verdict, Verdict::kDisagreement);
+  EXPECT_EQ(result.attribution.cause, Cause::kSensing);
+  ASSERT_FALSE(result.causes.empty());
+  const Explanation& first = result.causes.front();
+  EXPECT_EQ(first.faults.front().place, "joint panda_joint4, position");
+  EXPECT_NEAR(first.from, -0.299, 1e-9);
+  EXPECT_NEAR(first.to, -0.2, 1e-9);
+  EXPECT_TRUE(first.ends);
+}
+
 // Declared imperfections are considered only where nothing else explains the failure.
 const std::vector<std::string> kExpectsMuch = {"duration=0.1", "settle=0.3", "expect.from=0",
                                                "expect.position=1e-9", "actuation.delay=0.001"};
