@@ -93,20 +93,17 @@ const GraspModel& RunChecks::Follow(const StepRecord& step) {
   return *declared_step_->model;
 }
 
-void RunChecks::Reset() {
-  std::copy_if(records_.begin(), records_.end(), std::back_inserter(settling_failures_),
-               [](const CheckRecord& record) { return record.failed; });
-  Forget();
-  analyzer_.RestartClearance();
-}
-
-void RunChecks::Forget() {
-  for (CheckRecord& record : records_) record.Reset();
+void RunChecks::Reset(Keep keep) {
+  for (CheckRecord& record : records_) {
+    if (record.failed && (keep == Keep::kAll || HoldsAlways(record))) settling_failures_.push_back(record);
+    record.Reset();
+  }
   if (limited_) limited_->Reset();
   for (const Judge& judge : judges_)
     if (judge.state) judge.state->Reset();
   analyzer_.Reset();
   if (law_) law_->Forget();
+  if (keep == Keep::kAll) analyzer_.RestartClearance();
 }
 
 bool RunChecks::Has(std::string_view name) const {
@@ -177,11 +174,6 @@ bool RunChecks::CompareTorque(const StepRecord& step) {
   (controller_ ? *controller_ : model_).SetState(step.model->grasp(), step.measured.state);
   unsent_.torque = law_->CompareTorque(step, ReadLawTerms(step, /*contacts=*/false));
   return true;
-}
-
-void RunChecks::FollowLaw(const StepRecord& step) {
-  Look(step);
-  CompareTorque(step);
 }
 
 void RunChecks::JudgeStep(const StepRecord& step) {

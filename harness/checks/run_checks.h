@@ -71,10 +71,6 @@ class RunChecks {
 
   /// Judges the effort before a step that the motors may refuse. @param time of the step, s.
   void JudgeEffort(const StepRecord& step, double time);
-  /// Looks at a step that no check judges.
-  void Look(const StepRecord& step);
-  /// Follows the law at a step that no check judges.
-  void FollowLaw(const StepRecord& step);
   /// Judges a step while everything settles.
   void JudgeSettling(const StepRecord& step);
   /// Compares the terms that the controller used with the engine's.
@@ -83,10 +79,10 @@ class RunChecks {
   void JudgeStep(const StepRecord& step);
   /// Judges model and torques alone, where torques were not sent because they are above a motor's limit.
   void JudgeUnsent(const StepRecord& step);
-  /// Forgets motion and forces of all steps so far, but for the checks that failed: time begins anew.
-  void Reset();
-  /// Forgets as Reset, and the checks that failed as well.
-  void Forget();
+  /// Checks that failed and are kept: all; those that hold at every step, while contacts find their places.
+  enum class Keep { kAll, kHoldsAlways };
+  /// Forgets motion and forces of all steps so far, but for such checks that failed: time begins anew.
+  void Reset(Keep keep);
 
   [[nodiscard]] std::span<const CheckRecord> model_checks() const { return model_.records(); }
   [[nodiscard]] std::span<const CheckRecord> motion_checks() const { return records_; }
@@ -110,6 +106,8 @@ class RunChecks {
 
  private:
   void CheckMeasuredState();
+  /// Begins the analysis of a step, whose torques are set.
+  void Look(const StepRecord& step);
   void Analyze(const StepRecord& step);
   /// Evaluates the checks of that moment.
   void Evaluate(CheckInfo::Moment moment, double time);

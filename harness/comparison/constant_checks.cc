@@ -233,8 +233,23 @@ void MechanismComparison::AddOneSided() {
   }
 }
 
+/// Solves couplings for the joint that the other side couples: q1 = 2 q2 says what q2 = q1 / 2 says.
+static void AlignCouplings(const StatedConstants& other, StatedConstants* stated) {
+  for (size_t i = 0; i < stated->joints.size(); ++i) {
+    const std::optional<JointCoupling> own = stated->joints[i].coupling;
+    if (!own || own->leader < 0 || own->multiplier == 0.0 || other.joints[i].coupling) continue;
+    const auto leader = static_cast<size_t>(own->leader);
+    const std::optional<JointCoupling>& there = other.joints[leader].coupling;
+    if (!there || there->leader != static_cast<int>(i) || stated->joints[leader].coupling) continue;
+    stated->joints[leader].coupling = {static_cast<int>(i), 1.0 / own->multiplier,
+                                       -own->offset / own->multiplier};
+    stated->joints[i].coupling.reset();
+  }
+}
+
 void MechanismComparison::CompareCouplings(bool by_engine) {
   constexpr const char* kCheck = "joint_coupling";
+  AlignCouplings(a_, &b_);
   std::vector<std::string> only_there;
   for (int i = 0; i < model_.num_joints(); ++i) {
     const auto &own = a_.joints[static_cast<size_t>(i)].coupling,

@@ -56,6 +56,7 @@ class MovedFile {
       : side_(side), other_(other), ignore_(ignore), part_(part), model_(model) {
     nominal_ = Complete(own.nominal);
     spread_.nominal = MakeCopy(nominal_);
+    const BodyDifferences placed = ComparePlaced(nominal_);
     for (const RobotDescription& draw : own.draws) {
       const Sides moved = Complete(draw);
       try {
@@ -67,18 +68,34 @@ class MovedFile {
         double& open = constants_[KeyOf(finding, nominal_[side_].spec)];
         open = Worst(open, std::abs(finding.model - finding.engine));
       }
+      BodyDifferences there = ComparePlaced(moved);
+      for (const auto& [key, difference] : placed) there[key] -= difference;
+      for (const auto& [key, change] : there) placed_[key] = Worst(placed_[key], std::abs(change));
     }
     if (own.undiagonalized) TakeDiagonalisation(*own.undiagonalized);
   }
 
   [[nodiscard]] const TermComparison::Spread& spread() const { return spread_; }
   [[nodiscard]] const Sides& nominal() const { return nominal_; }
-  [[nodiscard]] double FindOpen(const ConstantKey& key) const {
-    const auto found = constants_.find(key);
-    return found == constants_.end() ? 0.0 : found->second;
+  /// @param is_placed whether both files' bodies stand in the link frames of the first.
+  [[nodiscard]] double FindOpen(const ConstantKey& key, bool is_placed) const {
+    const BodyDifferences& open = is_placed ? placed_ : constants_;
+    const auto found = open.find(key);
+    return found == open.end() ? 0.0 : found->second;
   }
 
  private:
+  using BodyDifferences = std::map<ConstantKey, double>;
+
+  /// Returns by how much bodies' numbers differ with the links' frames where they stand at zero.
+  [[nodiscard]] BodyDifferences ComparePlaced(const Sides& sides) const {
+    BodyDifferences differences;
+    for (const ConstantFinding& finding :
+         CompareBodies(sides[0], sides[1], PlaceLinkFrames(sides[0], sides[1])).findings)
+      differences[KeyOf(finding, nominal_[0].spec)] = finding.model - finding.engine;
+    return differences;
+  }
+
   /// Both files' descriptions brought to the same statements, one of them with its numbers moved.
   [[nodiscard]] Sides Complete(const RobotDescription& own) const {
     Sides sides = side_ == 0 ? Sides{own, other_} : Sides{other_, own};
@@ -121,7 +138,7 @@ class MovedFile {
   std::vector<std::unique_ptr<RobotModel>> models_;
   std::vector<std::unique_ptr<AnalyticProvider>> providers_;
   TermComparison::Spread spread_{};
-  std::map<ConstantKey, double> constants_;
+  BodyDifferences constants_, placed_;  // largest changes of a draw
 };
 
 void RaiseTo(double value, double* largest) { *largest = Worst(*largest, value); }
@@ -137,7 +154,7 @@ class DigitJudge {
   void JudgeConstants(ConstantChecks* constants) {
     std::erase_if(constants->findings, [&](const ConstantFinding& finding) {
       const double size = Worst(std::abs(finding.model), std::abs(finding.engine));
-      return IsWithin(finding, size);
+      return IsWithin(finding, size, FindOpen(finding));
     });
     for (CheckRecord& record : constants->records) {
       if (!record.failed) continue;
@@ -156,15 +173,20 @@ class DigitJudge {
       for (const ConstantFinding& finding : CompareBodies(sides[0], sides[1], choices[i]).findings)
         found[i][finding.location.first].push_back(finding);
     }
-    const auto find_worst = [&](const std::vector<ConstantFinding>& findings) {
+    const auto find_open = [&](const ConstantFinding& one, bool is_placed) {
+      return FindOpen(one, is_placed) + kChains * one.scale;
+    };
+    const auto find_worst = [&](const std::vector<ConstantFinding>& findings, bool is_placed) {
       double worst = 0.0;
-      for (const ConstantFinding& one : findings) RaiseTo(CalcUnits(one, kChains * one.scale), &worst);
+      for (const ConstantFinding& one : findings) RaiseTo(CalcUnits(one, find_open(one, is_placed)), &worst);
       return worst;
     };
     for (const auto& [link, same] : found[0]) {
       const std::vector<ConstantFinding>& placed = found[1][link];
-      for (const ConstantFinding& finding : find_worst(same) <= find_worst(placed) ? same : placed) {
-        if (!IsWithin(finding, finding.scale, kChains)) failed_bodies_.insert(finding.check);
+      const bool is_placed = find_worst(placed, true) < find_worst(same, false);
+      for (const ConstantFinding& finding : is_placed ? placed : same) {
+        if (!IsWithin(finding, finding.scale, find_open(finding, is_placed)))
+          failed_bodies_.insert(finding.check);
       }
     }
   }
@@ -203,19 +225,18 @@ class DigitJudge {
   }
 
   /// The printed precision of both files.
-  [[nodiscard]] double FindOpen(const ConstantFinding& finding) const {
+  [[nodiscard]] double FindOpen(const ConstantFinding& finding, bool is_placed = false) const {
     const ConstantKey key = KeyOf(finding, model_.spec());
-    return a_.FindOpen(key) + b_.FindOpen(key);
+    return a_.FindOpen(key, is_placed) + b_.FindOpen(key, is_placed);
   }
-  [[nodiscard]] double CalcUnits(const ConstantFinding& finding, double rounding) const {
-    return std::abs(finding.model - finding.engine) / (FindOpen(finding) + rounding);
+  static double CalcUnits(const ConstantFinding& finding, double open) {
+    return std::abs(finding.model - finding.engine) / open;
   }
 
-  /// @param rounding relative to `size`, which is allowed for beside the printed precision.
-  bool IsWithin(const ConstantFinding& finding, double size, double rounding = 0.0) {
+  /// @param open what is allowed, of a number of this size.
+  bool IsWithin(const ConstantFinding& finding, double size, double open) {
     constexpr double kTie = 1e-6;  // of two numbers that are half a unit apart to their last digit
-    const double open = FindOpen(finding) + rounding * size;
-    const double units = CalcUnits(finding, rounding * size);
+    const double units = CalcUnits(finding, open);
     RaiseTo(units, &verdict_.units[finding.check]);
     ConstantFinding excess = finding;
     excess.units = units;

@@ -178,8 +178,13 @@ class PartReader {
     std::set<int> couplings;
     for (int i = 0; options_.leaves_out_couplings && i < adapter_.model().num_joints(); ++i) {
       const int id = adapter_.joint_ids()[static_cast<size_t>(i)];
-      const bool has = options_.leaves_out_all_couplings || adapter_.model().joint(i).coupling;
-      if (has && FindEngineCoupling(engine_, id)) couplings.insert(FindCouplingConstraint(engine_, id));
+      const std::optional<JointCoupling> coupling = FindEngineCoupling(engine_, id);
+      if (!coupling) continue;
+      const int leader = IndexOf(adapter_.joint_ids(), coupling->leader);
+      const bool leads = leader >= 0 && adapter_.model().joint(leader).coupling &&
+                         adapter_.model().joint(leader).coupling->leader == i;
+      if (options_.leaves_out_all_couplings || adapter_.model().joint(i).coupling || leads)
+        couplings.insert(FindCouplingConstraint(engine_, id));
     }
     for (int i = 0; i < engine_.neq; ++i) {
       if (couplings.contains(i)) continue;

@@ -14,6 +14,7 @@ namespace {
 /// Relative to the tolerances of the file as it is: what is farther off is right only if little of it is
 /// left.
 constexpr double kFar = 100.0;
+constexpr double kNearer = 0.01;  // of the deviation before
 
 }  // namespace
 
@@ -91,8 +92,14 @@ bool CandidateSearch::Try(const EditTrial& trial, int place, const std::vector<P
         const bool is_wrong = IsWrong(tried.link, kind);
         const double was = pair_.CompareNode(kind, tried.link);
         const double ratio = pair_.CompareNode(kind, tried.link, now);
-        const bool holds = is_close ? (is_wrong ? CountLeft(ratio, was).has_value() : ratio <= 1.0)
-                                    : ratio < kFar || ratio < 0.05 * was;
+        // An entry that is printed exactly, as a 0, must not hide that the others become no better.
+        const auto is_nearer = [&] {
+          return ratio <= 1.0 || pair_.CalcDeviation(kind, tried.link, now) <
+                                     kNearer * pair_.CalcDeviation(kind, tried.link, given);
+        };
+        const bool holds = is_close
+                               ? (is_wrong ? CountLeft(ratio, was).has_value() && is_nearer() : ratio <= 1.0)
+                               : ratio < kFar || ratio < 0.05 * was;
         if (!holds && (!is_wrong || trial.needs_all)) return false;
         if (!is_close || !is_wrong || !holds) continue;
         right.push_back({kind, tried.link});

@@ -278,8 +278,11 @@ class OneWay {
       for (const LinkPatch& patch : candidates[c].patches)
         Merge(before.link(patch.link), patch.right, &pair_.mutable_a()->link(patch.link));
       // A site without a patch stays as it is.
+      // A body that the file had not is none of the parts that are measured.
+      const bool is_measured =
+          !candidates[c].patches.empty() && !pair_.node(candidates[c].link).parts.empty();
       for (const Site& site : candidates[c].sites)
-        settled_.push_back({site, candidates[c].patches.empty() ? 0.0 : candidates[c].rest});
+        settled_.push_back({site, is_measured ? candidates[c].rest : 0.0});
     }
   }
 

@@ -31,6 +31,7 @@ void CandidateSearch::SearchAxis(int link) {
     AddSimple({fault, bits, 0, DescribeRight(joint.axis, axis)}, link,
               [axis](PrintedLink* made) { made->joint.axis = axis; });
   };
+  if (!joint.states_axis) return offer({Kind::kMissing, SiteKind::kAxis}, 0.5, right.axis);
   for (const auto& [fault, axis] : ListAxisEdits(given)) offer(fault, 0.0, axis);
   const bool is_turned = (given + right.axis).norm() <= open;
   const GivenNode& numbers = pair_.given(link);
@@ -39,8 +40,6 @@ void CandidateSearch::SearchAxis(int link) {
     offer({Kind::kAlongParent, SiteKind::kAxis}, 0.0, R.transpose() * given, numbers.pose.angle);
     offer({Kind::kAlongToParent, SiteKind::kAxis}, 0.0, R * given, numbers.pose.angle);
   }
-  if ((given - Vector3d::UnitX()).norm() < 1e-12 && pair_.a().format == RobotFormat::kUrdf)
-    offer({Kind::kMissing, SiteKind::kAxis}, 0.5, right.axis);
   const bool is_simple = right.axis.cwiseAbs().maxCoeff() > 1.0 - 1e-6;
   if (!is_turned) offer({Kind::kOtherAxis, SiteKind::kAxis}, is_simple ? 3.0 : 25.0, right.axis);
 }

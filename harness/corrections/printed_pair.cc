@@ -148,6 +148,24 @@ void PrintedPair::SetRight(int link) {
   right.body_tolerance.inertia.array() += 2.0 * open.angle * std::abs(theirs.body.inertia.trace());
 }
 
+double PrintedPair::CalcDeviation(SiteKind kind, int link, const GivenNode& now) const {
+  const RightNode& right = right_[static_cast<size_t>(link)];
+  switch (kind) {
+    case SiteKind::kPosition:
+      return (now.X.translation() - right.X.translation()).norm();
+    case SiteKind::kRotation:
+      return CalcAngle(now.X.linear().transpose() * right.X.linear());
+    case SiteKind::kMass:
+      return std::abs(now.body.mass - right.body.mass);
+    case SiteKind::kCom:
+      return (now.body.com - right.body.com).norm();
+    case SiteKind::kInertia:
+      return (now.body.inertia - right.body.inertia).norm();
+    default:
+      return 0.0;
+  }
+}
+
 double PrintedPair::CompareNode(SiteKind kind, int link, const GivenNode& now) const {
   const RightNode& right = right_[static_cast<size_t>(link)];
   const MassProperties &body = now.body, &tolerance = now.body_tolerance;
@@ -340,8 +358,11 @@ std::vector<Site> PrintedPair::ListSites() const {
       if (is_exchanged("link " + ours.name, "link " + theirs.name))
         sites.push_back({SiteKind::kLinkName, link});
     }
-    // A base that stands still needs no inertial.
-    const bool bears = !(link == 0 || j == 0) || (!node(link).parts.empty() && !node_b(j).parts.empty());
+    // A base that stands still needs no inertial beside a file of another form, whose base is the world.
+    const bool is_same_base = link == 0 && j == 0 && a_.format == RobotFormat::kUrdf &&
+                              b_.format == RobotFormat::kUrdf && ours.name == theirs.name;
+    const bool bears =
+        is_same_base || !(link == 0 || j == 0) || (!node(link).parts.empty() && !node_b(j).parts.empty());
     if (!bears || (node(link).parts.empty() && node_b(j).parts.empty())) continue;
     for (const SiteKind kind : kBodyKinds) compare(kind, link);
   }

@@ -91,6 +91,7 @@ struct PrintedJoint {
   std::string name;
   JointKind kind = JointKind::kFixed;
   Vector3d axis = Vector3d::UnitZ(), half_axis = Vector3d::Zero();
+  bool states_axis = true;             ///< Whether the file does; a URDF's joint without it has (1 0 0).
   Vector3d anchor = Vector3d::Zero();  ///< A point of the axis, in the link's frame, m.
   std::optional<std::array<PrintedScalar, 2>> range;
   std::array<std::optional<PrintedScalar>, kNumJointScalars> scalars;

@@ -61,7 +61,9 @@ PrintedJoint ReadUrdfJoint(const UrdfJoint& joint) {
   printed.name = joint.name;
   printed.kind = FindUrdfKind(joint.type);
   printed.axis = Vector3d::UnitX();
-  if (const Element* const axis = joint.element->FirstChildElement("axis"))
+  const Element* const axis = joint.element->FirstChildElement("axis");
+  printed.states_axis = axis != nullptr;
+  if (axis != nullptr)
     std::tie(printed.axis, printed.half_axis) = ReadPrintedVector<3>(ReadAttribute(*axis, "xyz", "1 0 0"));
   const Element* const limit = joint.element->FirstChildElement("limit");
   const Element* const dynamics = joint.element->FirstChildElement("dynamics");

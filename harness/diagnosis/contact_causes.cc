@@ -55,6 +55,11 @@ Causes ExplainGeometry(const StepStore& store) {
       fault.detail = FormatVector((one.offset.array().abs() > kRounding).select(one.offset, 0.0), 4);
       if (one.turn > kRounding) fault.detail += " and turned by " + FormatNumber(turn, 4) + " deg";
     }
+    if (one.axis_turn > 0.0) {
+      const mjModel& engine = store.setup().engine();
+      const std::string joint = NameOf(engine, mjOBJ_JOINT, engine.body_jntadr[one.body]);
+      fault = {"axis turned by", "joint " + joint, RadToDeg(one.axis_turn), 0.0, "deg", ""};
+    }
     cause.faults.push_back(fault);
   }
   return causes;

@@ -300,27 +300,34 @@ void StepStore::WatchJumps(const Eigen::Ref<const VectorXd>& row) {
   ++num_jumps_;
 }
 
+/// Pose of one of the engine's bodies on another, by the places of all.
+static Pose CalcPoseOn(int other, int body, const mjtNum* positions, const mjtNum* rotations) {
+  const Pose X = MapPose(rotations + 9 * other, positions + 3 * other);
+  return X.inverse(Eigen::Isometry) * MapPose(rotations + 9 * body, positions + 3 * body);
+}
+
 void StepStore::FindMisplaced(const StepRecord& step) {
   const PlantReading& plant = step.reading;
   const mjModel& engine = setup_->engine();
-  if (!misplaced_.empty() || plant.body_positions.size() != 3 * engine.nbody || !plant.qpos.allFinite())
-    return;
+  if (plant.body_positions.size() != 3 * engine.nbody || !plant.qpos.allFinite()) return;
+  if (!misplaced_.empty()) return FindAxes(plant);
   std::copy_n(plant.qpos.data(), engine.nq, kinematics_->qpos);
   mj_kinematics(&engine, kinematics_.get());
   // Offset (m) and turn (rad) of a body in its parent's axes, beyond rounding.
   const auto find = [&](int body, int parent, const std::string& name) {
-    const auto place = [&](const mjtNum* positions, const mjtNum* rotations) {
-      const Pose X = MapPose(rotations + 9 * parent, positions + 3 * parent);
-      return X.inverse(Eigen::Isometry) * MapPose(rotations + 9 * body, positions + 3 * body);
-    };
-    const Pose declared = place(kinematics_->xpos, kinematics_->xmat);
-    const Pose actual = place(plant.body_positions.data(), plant.body_rotations.data());
+    const Pose declared = CalcPoseOn(parent, body, kinematics_->xpos, kinematics_->xmat);
+    const Pose actual = CalcPoseOn(parent, body, plant.body_positions.data(), plant.body_rotations.data());
     const Vector3d offset = actual.translation() - declared.translation();
     const double turn = Eigen::AngleAxisd(Matrix3d(actual.linear() * declared.linear().transpose())).angle();
     constexpr double kRounding = 1e-10;  // m and rad
     const bool differs = offset.norm() > kRounding || turn > kRounding;
-    if (differs)
-      misplaced_.push_back({name, "link " + NameOf(engine, mjOBJ_BODY, parent), step.time, offset, turn});
+    if (!differs) return;
+    Misplaced& one = misplaced_.emplace_back();
+    one.place = name, one.parent = "link " + NameOf(engine, mjOBJ_BODY, parent);
+    one.from = step.time, one.offset = offset, one.turn = turn;
+    one.body = body, one.on = parent, one.X = actual;
+    if (engine.body_jntnum[body] == 1)
+      one.position = plant.qpos[engine.jnt_qposadr[engine.body_jntadr[body]]];
   };
   const std::vector<int>& bodies = setup_->adapter().link_bodies();
   for (int link = 0; link < setup_->model().num_joints(); ++link) {
@@ -335,6 +342,29 @@ void StepStore::FindMisplaced(const StepRecord& step) {
     if (bodies[0] >= 0) find(body, bodies[0], "wheel " + NameOf(engine, mjOBJ_BODY, body));
   }
   misplaced_wheels_ = misplaced_.size() - links;
+}
+
+void StepStore::FindAxes(const PlantReading& plant) {
+  constexpr double kLeast = 1e-3;      // rad or m, that a joint has to move
+  constexpr double kRounding = 1e-10;  // of poses, m and rad
+  const mjModel& engine = setup_->engine();
+  for (Misplaced& one : misplaced_) {
+    if (engine.body_jntnum[one.body] != 1) continue;
+    const int joint = engine.body_jntadr[one.body];
+    const bool slides = engine.jnt_type[joint] == mjJNT_SLIDE;
+    if (!slides && engine.jnt_type[joint] != mjJNT_HINGE) continue;
+    const double moved = plant.qpos[engine.jnt_qposadr[joint]] - one.position;
+    const bool is_far = !slides && std::abs(moved) > 3.0;  // turns are known to half of one
+    if (is_far || std::abs(moved) < std::max(kLeast, 2.0 * std::abs(one.moved))) continue;
+    one.moved = moved;
+    const Pose way = one.X.inverse(Eigen::Isometry) *
+                     CalcPoseOn(one.on, one.body, plant.body_positions.data(), plant.body_rotations.data());
+    const Eigen::AngleAxisd turn(Matrix3d(way.linear()));
+    const Vector3d axis = (slides ? way.translation() : Vector3d(turn.angle() * turn.axis())) / moved;
+    const Vector3d declared = MapVector(engine.jnt_axis + 3 * joint);
+    const double angle = std::atan2(axis.cross(declared).norm(), axis.dot(declared));
+    one.axis_turn = angle > kRounding / std::abs(moved) ? angle : 0.0;
+  }
 }
 
 void StepStore::Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row) {

@@ -125,6 +125,13 @@ class StepStore {
     double from = 0.0;                   ///< s
     Vector3d offset = Vector3d::Zero();  ///< m
     double turn = 0.0;                   ///< rad
+    int body = -1, on = -1;              ///< The engine's bodies.
+    Pose X = Pose::Identity();           ///< Of the one on the other at that time.
+    double position = 0.0;               ///< Its joint's then, rad or m.
+    /// Angle of the joint's axis against the declared one in the link, rad, by how the link moved since then;
+    /// 0 where that is as declared, and the link is elsewhere at every position.
+    double axis_turn = 0.0;
+    double moved = 0.0;  ///< Of the joint between then and the step that showed it, rad or m.
   };
   [[nodiscard]] const std::vector<Misplaced>& misplaced() const { return misplaced_; }
   /// Whether a link is among them, and not only wheels.
@@ -150,8 +157,9 @@ class StepStore {
   /// Returns how far the residual's change at a recent step is from that of any step around it, the robot's
   /// and the object's root mean square over their noise.
   [[nodiscard]] Vector2d CalcApart(Eigen::Index step) const;
-  /// Notes which links are misplaced, until some are.
+  /// Notes which links are misplaced, until some are, and then about which axes these move.
   void FindMisplaced(const StepRecord& step);
+  void FindAxes(const PlantReading& plant);
   void Keep(Eigen::Index block, const Eigen::Ref<const VectorXd>& row);
 
   const Setup* setup_;

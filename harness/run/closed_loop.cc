@@ -16,8 +16,7 @@ double Seconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-constexpr double kRoughTime = 0.02;      // s after the first contact, not judged at all
-constexpr double kFindsGrip = 0.1;       // s after it, judged, but forgotten if the grasp lasts longer
+constexpr double kFindsGrip = 0.1;       // s after the first contact, when assumptions need not hold
 constexpr double kLargestSkew = 1e-2;    // rad between the platform's heading and the way ahead
 constexpr double kSettleMoving = 0.5;    // s
 constexpr double kLargestTilt = 0.2;     // rad, of a robot that still stands
@@ -109,16 +108,10 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration, double end,
     if (checks_) checks_->JudgeEffort(record_, t);
     if (checks_) record_.true_model = &checks_->Follow(record_);
     // The first contact is rough; later errors have a cause that the checks should report.
-    if (checks_ && i == grip) {
-      checks_->Forget();
-      store_->Reset();
-    }
-    if (checks_ && t >= kRoughTime) {
+    if (i == grip) ForgetSteps(RunChecks::Keep::kHoldsAlways);
+    if (checks_) {
       checks_->JudgeSettling(record_);
       store_->Add(record_, checks_->analysis(), checks_->differs());
-    } else if (checks_) {
-      checks_->FollowLaw(record_);
-      store_->Add(record_, checks_->analysis(), /*differs=*/false, StepStore::Judged::kSignals);
     }
     try {
       CheckGrasp();
@@ -152,10 +145,10 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
   return true;
 }
 
-void ClosedLoop::ForgetSteps() {
+void ClosedLoop::ForgetSteps(RunChecks::Keep keep) {
   if (!checks_) return;
   const size_t before = checks_->settling_failures().size();
-  checks_->Reset();
+  checks_->Reset(keep);
   if (!settling_store_ && std::ranges::any_of(checks_->settling_failures().subspan(before), HoldsAlways))
     settling_store_ = *store_;
   store_->Reset();

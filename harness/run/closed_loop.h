@@ -105,7 +105,7 @@ class ClosedLoop {
   /// Makes ControlStep as far as it comes.
   void MakeStep(double t);
   /// Lets time begin anew for checks and causes.
-  void ForgetSteps();
+  void ForgetSteps(RunChecks::Keep keep = RunChecks::Keep::kAll);
   /// Makes the checks of the step in this thread.
   void Check();
   /// Makes all checks of a step of the run.

@@ -71,5 +71,37 @@ TEST(FileVerdicts, OfTermsAndOfPrintedNumbersAreOne) {
   EXPECT_LE(wrong.terms_alone, 0.02 * wrong.pairs);
 }
 
+/// An arm whose first link has this frame, turned about z by -yaw from where it is for 0.
+std::string WriteArm(const char* yaw, const char* com, const char* moments, const char* place,
+                     const char* back) {
+  return fmt::format(
+      "<robot name='arm'><link name='base'/><link name='upper'><inertial><origin xyz='{}'/><mass "
+      "value='2.13'/><inertia {} ixy='0' ixz='0' iyz='0'/></inertial></link><link name='lower'><inertial>"
+      "<origin xyz='0.08 -0.01 0.02'/><mass value='0.313'/><inertia ixx='0.00104' iyy='0.00231' "
+      "izz='0.00283' ixy='0' ixz='0' iyz='0'/></inertial></link><joint name='q1' type='continuous'><parent "
+      "link='base'/><child link='upper'/><origin xyz='0 0 0.3' rpy='0 0 {}'/><axis xyz='0 0 1'/></joint>"
+      "<joint name='q2' type='continuous'><parent link='upper'/><child link='lower'/><origin xyz='{}' "
+      "rpy='0 0 {}'/><axis xyz='0 1 0'/></joint></robot>",
+      com, moments, yaw, place, back);
+}
+
+// The printed angle turns numbers that are printed exactly.
+TEST(FileVerdicts, OfTurnedFramesCountTheDigitsOfTheAngle) {
+  DescriptionFile first(
+      "a.urdf", WriteArm("0", "0 0.067 0.034", "ixx='0.017' iyy='0.0164' izz='0.006'", "0.1 0.2 0.3", "0"),
+      {});
+  DescriptionFile second("b.urdf",
+                         WriteArm("1.570796", "0.067 0 0.034", "ixx='0.0164' iyy='0.017' izz='0.006'",
+                                  "0.2 -0.1 0.3", "-1.570796"),
+                         {});
+  ConsistencyOptions options;
+  options.samples = 20;
+  options.within_digits = true;
+  const Comparison comparison = CompareFiles(&first, &second, {}, options, [](long) { return true; });
+  EXPECT_TRUE(comparison.result.Agrees());
+  ASSERT_TRUE(comparison.causes.has_value());
+  EXPECT_TRUE(comparison.causes->agrees);
+}
+
 }  // namespace
 }  // namespace dexcheck::testing::file_verdicts_test

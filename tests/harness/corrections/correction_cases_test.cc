@@ -172,6 +172,38 @@ TEST(CorrectionCases, OneSidedRangesDoNotAgree) {
 }
 
 // A number that is wrong twice over: what one correction leaves is looked at again.
+FileCorrections CompareUrdfs(const std::string& first, const std::string& second) {
+  return FindCorrections(Read("a.urdf", first), Read("b.urdf", second));
+}
+
+// Products that one file prints as 0 are exact: a factor that shrinks these puts nothing else right.
+TEST(CorrectionCases, AnExactZeroHidesNoOtherEntry) {
+  const std::string entries =
+      "ixx='0.0104' iyy='0.0211' izz='0.0303' ixy='0.0011' ixz='0.0005' iyz='-0.0007'";
+  const FileCorrections found =
+      CompareUrdfs(Replace(kUrdf, entries,
+                           "ixx='0.02409102262' iyy='0.02376976455' izz='0.02195988478' ixy='0.00012787556' "
+                           "ixz='0.00114870039' iyz='0.00078086899'"),
+                   Replace(kUrdf, entries, "ixx='0.0231' iyy='0.0231' izz='0.0231' ixy='0' ixz='0' iyz='0'"));
+  EXPECT_THAT(ListIds(found), ElementsAre("number.inertia"));
+}
+
+TEST(CorrectionCases, OnlyAnAxisThatIsNotStatedIsMissing) {
+  const std::string axis = "<axis xyz='0 0 1'/>", turned = "<axis xyz='1 0.1 0'/>";
+  const std::string stated = Replace(kUrdf, axis, "<axis xyz='1 0 0'/>");
+  EXPECT_THAT(ListIds(CompareUrdfs(stated, Replace(kUrdf, axis, turned))), ElementsAre("number.axis"));
+  EXPECT_THAT(ListIds(CompareUrdfs(Replace(kUrdf, axis, ""), kUrdf)), ElementsAre("axis.missing"));
+}
+
+// It does not act on a base that stands still, and is a number of both files all the same.
+TEST(CorrectionCases, AnInertialOfTheBaseThatOneUrdfLacksIsNamed) {
+  const std::string with = Replace(kUrdf, "<link name='base'/>",
+                                   "<link name='base'><inertial><mass value='2.9'/><inertia ixx='0.01' "
+                                   "iyy='0.01' izz='0.02' ixy='0' ixz='0' iyz='0'/></inertial></link>");
+  EXPECT_THAT(ListIds(CompareUrdfs(kUrdf, with)), ElementsAre("body.missing"));
+  EXPECT_THAT(ListIds(CompareUrdfs(with, kUrdf)), ElementsAre("body.missing"));
+}
+
 TEST(CorrectionCases, TwoFaultsOfOneWeldedBodyAreBothNamed) {
   const std::string fused = Replace(kUrdf, "<link name='tip'/>",
                                     "<link name='tip'><inertial><origin xyz='0.03 0.05 0.11'/><mass "

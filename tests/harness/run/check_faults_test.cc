@@ -118,6 +118,55 @@ const CheckFault kFaults[] = {
     {"actuator_effort", "offset", {"duration=0.05", "start_error.xyz=[0, 0, 0.3]"}, Cause::kActuatorLimit},
 };
 
+/// A change of where something is in the simulation alone, and what is named for it.
+struct HiddenPlace {
+  const char* scenario;
+  const char* duration;
+  void (*change)(mjModel* model);
+  const char *place, *fault;
+  double value;
+};
+
+void MoveBody(mjModel* m, const char* body, double y) {
+  m->body_pos[3 * mj_name2id(m, mjOBJ_BODY, body) + 1] += y;
+}
+
+/// Turns the axis z of a joint about x by 1 deg.
+void TurnAxis(mjModel* m, const char* joint) {
+  double* const axis = m->jnt_axis + 3 * mj_name2id(m, mjOBJ_JOINT, joint);
+  axis[1] = -std::sin(DegToRad(1.0)), axis[2] = std::cos(DegToRad(1.0));
+}
+
+const HiddenPlace kHiddenPlaces[] = {
+    {"hand-hold", "duration=0.02", [](mjModel* m) { MoveBody(m, "h1_distal", 5e-4); }, "link h1_distal",
+     "off its place", 5e-4},
+    {"paper-ramp", "duration=0.02", [](mjModel* m) { MoveBody(m, "wheel_left", 1e-3); }, "wheel wheel_left",
+     "off its place", 1e-3},
+    {"stand", "duration=0.02", [](mjModel* m) { MoveBody(m, "fr_shank", 1e-3); }, "link fr_shank",
+     "off its place", 1e-3},
+    {"panda-reach", "duration=0.5", [](mjModel* m) { TurnAxis(m, "panda_joint3"); }, "joint panda_joint3",
+     "axis turned by", 1.0},
+};
+
+// What a link, a wheel or an axis elsewhere does to terms, contacts, forces and rolling is not listed beside
+// it.
+TEST(HiddenGeometry, IsNamedAlone) {
+  for (const HiddenPlace& hidden : kHiddenPlaces) {
+    SCOPED_TRACE(hidden.place);
+    const ShippedRun run(hidden.scenario, {hidden.duration, "expect={}"});
+    LoopParts parts = MakeLoopParts(run.setup());
+    dynamic_cast<EnginePlant&>(*parts.plant).simulation().Change(hidden.change);
+    Runner runner(run.setup(), /*check=*/true, std::move(parts));
+    const RunResult& result = runner.Run([](const StepRecord&) {}, [] { return false; });
+    EXPECT_EQ(result.attribution.cause, Cause::kModel);
+    ASSERT_EQ(result.causes.size(), 1u);
+    const Fault& fault = result.causes.front().faults.front();
+    EXPECT_EQ(fault.place, hidden.place);
+    EXPECT_THAT(fault.fault, HasSubstr(hidden.fault));
+    EXPECT_NEAR(fault.value, hidden.value, 1e-9 * hidden.value + 1e-12);
+  }
+}
+
 class CheckFaults : public ::testing::TestWithParam<CheckFault> {};
 
 TEST_P(CheckFaults, FailTheirCheck) {
