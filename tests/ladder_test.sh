@@ -18,7 +18,7 @@ list_faults() {
   includes=$(list_includes "$1")
   awk '{ print $1, $2 }' <<<"$includes" | sort -u | tsort 2>&1 >/dev/null | sed -E 's/^tsort: -: //' |
     tr '\n' ' ' | sed -E 's/ $/\n/; s/^/folders include one another: /'
-  order=$(sed -nE 's|^ *add_subdirectory\((.*)\)$|harness/\1|p' "$1/harness/CMakeLists.txt")
+  order=$(sed -nE 's/^ *(add_subdirectory|dexcheck_add_library)\(([a-z]+)[ )].*/harness\/\2/p' "$1/harness/CMakeLists.txt")
   awk 'NR == FNR { height[$1] = NR; next }
     $1 ~ /^harness\// && !($1 in height) { print $3 ": its folder is not added by harness/CMakeLists.txt"; next }
     $2 in height && $1 in height && height[$2] > height[$1] { print $3 ": includes a header of " $2 ", which is above" }
@@ -51,7 +51,7 @@ root=$1
 scratch=$(mktemp -d)
 trap 'rm -r "$scratch"' EXIT
 mkdir -p "$scratch"/{controller/model,harness/base,harness/log,renders}
-printf 'add_subdirectory(base)\nadd_subdirectory(log)\n' >"$scratch/harness/CMakeLists.txt"
+printf 'dexcheck_add_library(base)\nadd_subdirectory(log)\n' >"$scratch/harness/CMakeLists.txt"
 echo '#include "harness/base/files.h"' >"$scratch/harness/log/writer.cc"
 [[ -z $(list_faults "$scratch") ]] || { echo "a ladder is taken for none"; exit 1; }
 echo '#include "harness/log/writer.h"' >"$scratch/harness/base/files.cc"

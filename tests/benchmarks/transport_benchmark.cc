@@ -59,14 +59,14 @@ void MeasureController(const std::string& scenario, const std::string& run, cons
 int main() {
   const std::string examples = dexcheck::testing::SourcePath("/harness/examples/");
   MeasureController("panda-reach", "", "built in");
-  MeasureController("panda-reach", JOINT_LAW_LIBRARY, "library in C++, the same law");
-  MeasureController("panda-reach", JOINT_PD_LIBRARY, "library in C, PD with gravity");
-  MeasureController("panda-reach", ECHO_PROGRAM, "program in C, no law");
+  MeasureController("panda-reach", JOINT_LAW, "library in C++, the same law");
+  MeasureController("panda-reach", JOINT_PD, "library in C, PD with gravity");
+  MeasureController("panda-reach", ECHO_CONTROLLER, "program in C, no law");
   MeasureController("panda-reach", examples + "numpy_joint_law.py", "Python, the same law");
   MeasureController("panda-reach", SILENT_LAW, "Python, no law");
   MeasureController("curve", "", "built in");
-  MeasureController("curve", PAPER_LAW_LIBRARY, "library in C++, the same law");
-  MeasureController("curve", ECHO_PROGRAM, "program in C, no law");
+  MeasureController("curve", PAPER_LAW, "library in C++, the same law");
+  MeasureController("curve", ECHO_CONTROLLER, "program in C, no law");
   MeasureController("curve", SILENT_LAW, "Python, no law");
   return 0;
 }

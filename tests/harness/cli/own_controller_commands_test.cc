@@ -15,7 +15,7 @@ class OwnControllerCommands : public CommandTest {
   void SetUp() override {
     CommandTest::SetUp();
     ::setenv("DEXCHECK_PYTHON", "/usr/bin/python3", /*replace=*/1);
-    WriteScenario("own.toml", JOINT_LAW_LIBRARY, "");
+    WriteScenario("own.toml", JOINT_LAW, "");
   }
 
   void WriteScenario(const std::string& file, const std::string& run, const std::string& parameters) const {
@@ -52,19 +52,19 @@ TEST_F(OwnControllerCommands, AScenarioNamesItAndALogKnowsIt) {
   const Json checks = RunJson(0, "run own.toml --no-report --out run")["checks"];
   EXPECT_LE(checks["law_torque"]["max"], 1e-13);
   EXPECT_GT(checks["law_torque"]["max"], 0.0);
-  EXPECT_THAT(Expect(0, Words("run --replay run --controller") + Words{JOINT_LAW_LIBRARY}).out,
+  EXPECT_THAT(Expect(0, Words("run --replay run --controller") + Words{JOINT_LAW}).out,
               HasSubstr("IDENTICAL"));
   // Another one in its place is another run; the same file under another name is not what the log names.
-  std::filesystem::copy_file(JOINT_LAW_LIBRARY, Path("copy.so"));
+  std::filesystem::copy_file(JOINT_LAW, Path("copy.so"));
   EXPECT_THAT(Expect(0, "run --replay run --controller ./copy.so").out, HasSubstr("IDENTICAL"));
-  Expect(1, Words("run --replay run --controller") + Words{JOINT_PD_LIBRARY});
+  Expect(1, Words("run --replay run --controller") + Words{JOINT_PD});
   // Two files that are the same differ in the name only; a changed one differs in the hash too.
   WriteScenario("copied.toml", "copy.so", "");
   Expect(0, "run copied.toml --no-report --out copied");
   const std::string same = Expect(0, "compare run copied").out;
   EXPECT_THAT(same, HasSubstr("copy.so"));
   EXPECT_THAT(same, Not(HasSubstr("controller_hash")));
-  std::filesystem::copy_file(JOINT_PD_LIBRARY, Path("copy.so"),
+  std::filesystem::copy_file(JOINT_PD, Path("copy.so"),
                              std::filesystem::copy_options::overwrite_existing);
   const ProgramResult changed = Run("run --replay copied --controller ./copy.so");
   EXPECT_EQ(changed.exit_code, 1);
@@ -123,7 +123,7 @@ TEST_P(OwnLawEverywhere, IsWhereFaultsAreMade) {
 }
 
 INSTANTIATE_TEST_SUITE_P(OwnControllerCommands, OwnLawEverywhere,
-                         ::testing::Values(JOINT_LAW_LIBRARY, kNumPyLaw),
+                         ::testing::Values(JOINT_LAW, kNumPyLaw),
                          [](const auto& info) { return info.index == 0 ? "Library" : "NumPy"; });
 
 // In a study what a controller does wrong costs its trial, and no other; its process is of no use any more.
@@ -204,8 +204,8 @@ TEST_P(OwnParameters, AreKeysOfAStudy) {
 
 INSTANTIATE_TEST_SUITE_P(
     OwnControllerCommands, OwnParameters,
-    ::testing::Values(OwnParameter{"Cpp", JOINT_LAW_LIBRARY, "controller.natural_frequency", 5, 40},
-                      OwnParameter{"C", JOINT_PD_LIBRARY, "controller.stiffness", 400, 4000},
+    ::testing::Values(OwnParameter{"Cpp", JOINT_LAW, "controller.natural_frequency", 5, 40},
+                      OwnParameter{"C", JOINT_PD, "controller.stiffness", 400, 4000},
                       OwnParameter{"Python", kNumPyLaw, "controller.natural_frequency", 5, 40}),
     [](const auto& info) { return info.param.name; });
 

@@ -54,7 +54,7 @@ class OwnController : public CommandTest {
   }
 };
 
-TEST_F(OwnController, TheLawRewrittenAsALibraryIsTheLaw) { ExpectThePapersLaw(PAPER_LAW_LIBRARY); }
+TEST_F(OwnController, TheLawRewrittenAsALibraryIsTheLaw) { ExpectThePapersLaw(PAPER_LAW); }
 
 TEST_F(OwnController, TheLawRewrittenInNumPyIsTheLaw) {
   ExpectThePapersLaw(SourcePath("/harness/examples/numpy_law.py"));
@@ -96,7 +96,7 @@ TEST_P(OwnJointLaw, IsTheLaw) {
 }
 
 INSTANTIATE_TEST_SUITE_P(OwnController, OwnJointLaw,
-                         ::testing::Values(JOINT_LAW_LIBRARY,
+                         ::testing::Values(JOINT_LAW,
                                            SourcePath("/harness/examples/numpy_joint_law.py")),
                          [](const auto& info) { return info.index == 0 ? "Library" : "NumPy"; });
 
@@ -115,17 +115,17 @@ TEST_F(OwnController, TorquesAreHeldForAControlStep) {
   const Json free =
       RunJson(0, Words("run panda-reach --no-report --no-log --set duration=0.3 --set settle=0.1"))["checks"];
   EXPECT_GT(own["expect_joints"]["max"].get<double>(), 1.1 * free["expect_joints"]["max"].get<double>());
-  const ProgramResult library = Run(reach + Words{JOINT_LAW_LIBRARY});
+  const ProgramResult library = Run(reach + Words{JOINT_LAW});
   EXPECT_EQ(library.exit_code, 3);
   EXPECT_THAT(library.err, HasSubstr("changed its torques within plant.control_step (0.004 s)"));
 }
 
 TEST_F(OwnController, AJointLawIsNoneForAGrasp) {
-  EXPECT_TRUE(IsRefused(RunWith(JOINT_LAW_LIBRARY), {"joint_law.so", "[joint_motion]"}));
+  EXPECT_TRUE(IsRefused(RunWith(JOINT_LAW), {"joint_law.so", "[joint_motion]"}));
 }
 
 TEST_F(OwnController, AnUnknownLawIsNotChecked) {
-  const ProgramResult result = RunWith(PAPER_LAW_LIBRARY);
+  const ProgramResult result = RunWith(PAPER_LAW);
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out,
               HasSubstr("PASS: model, motors and sensors, inverse and forward dynamics, assumptions hold\n"
@@ -139,13 +139,13 @@ TEST_F(OwnController, AnUnknownLawIsNotChecked) {
     EXPECT_TRUE(checks.contains(check)) << check;
   // A log is data: it starts nothing.
   EXPECT_TRUE(IsRefused(Run("run --replay run"), {"run/log.h5", "--controller", "paper_law.so"}));
-  Expect(0, Words("run --replay run --controller") + Words{PAPER_LAW_LIBRARY});
+  Expect(0, Words("run --replay run --controller") + Words{PAPER_LAW});
 }
 
 // A log that ends before it, and nothing else, is left.
 TEST_F(OwnController, WhatALibraryDoesWrongEndsTheRunInOneLine) {
   const auto run = [&](const std::string& fault) {
-    return RunWith(FAULTY_LIBRARY, {"--controller-time-limit", "0.4", "--out", fault},
+    return RunWith(FAULTY_CONTROLLER, {"--controller-time-limit", "0.4", "--out", fault},
                    {.environment = {{"FAULT", fault}}});
   };
   EXPECT_EQ(run("none").exit_code, 0);
@@ -172,7 +172,7 @@ TEST_F(OwnController, WhatALibraryEndsIsNeverGood) {
                                      {"overflow", "ended the program (Segmentation fault)"},
                                      {"hang", "did not return in time (0.4 s for a step)"}}) {
     const ProgramResult result =
-        RunWith(FAULTY_LIBRARY, "--controller-time-limit 0.4 --no-log", {.environment = {{"FAULT", fault}}});
+        RunWith(FAULTY_CONTROLLER, "--controller-time-limit 0.4 --no-log", {.environment = {{"FAULT", fault}}});
     EXPECT_EQ(result.exit_code, 3) << fault << result.out;
     EXPECT_THAT(result.err, HasSubstr("faulty_controller.so")) << fault;
     EXPECT_THAT(result.err, HasSubstr(words)) << fault;
@@ -180,7 +180,7 @@ TEST_F(OwnController, WhatALibraryEndsIsNeverGood) {
     EXPECT_THAT(result.out, Not(HasSubstr("PASS"))) << fault;
   }
   for (const char* fault : {"exit", "text", "beyond"}) {
-    const ProgramResult result = RunWith(FAULTY_C_LIBRARY, "--no-log", {.environment = {{"FAULT", fault}}});
+    const ProgramResult result = RunWith(FAULTY_C_CONTROLLER, "--no-log", {.environment = {{"FAULT", fault}}});
     EXPECT_EQ(result.exit_code, 3) << fault << result.out;
     EXPECT_THAT(result.out + result.err, HasSubstr("faulty_c_controller.so")) << fault;
   }
@@ -189,7 +189,7 @@ TEST_F(OwnController, WhatALibraryEndsIsNeverGood) {
 // In a study they cost their trial.
 TEST_F(OwnController, WhatALibraryEndsCostsItsTrial) {
   WriteText(Path("study.toml"),
-            std::string("name = \"study\"\nscenario = \"hold\"\ncontroller = \"") + FAULTY_LIBRARY +
+            std::string("name = \"study\"\nscenario = \"hold\"\ncontroller = \"") + FAULTY_CONTROLLER +
                 "\"\nset = [\"controller.time_limit=0.4\", \"duration=0.02\", \"settle=0.2\"]\n"
                 "[[vary]]\nkey = \"plant.impratio\"\nvalues = [100]\n");
   for (const auto& [fault, words] :
@@ -204,18 +204,18 @@ TEST_F(OwnController, WhatALibraryEndsCostsItsTrial) {
 }
 
 TEST_F(OwnController, LibrariesThatAreNoneAreRefused) {
-  EXPECT_TRUE(IsRefused(RunWith(OTHER_INTERFACE_LIBRARY), {"interface", "0, of another time"}));
-  EXPECT_TRUE(IsRefused(RunWith(NO_CONTROLLER_LIBRARY), {"no controller"}));
+  EXPECT_TRUE(IsRefused(RunWith(OTHER_INTERFACE), {"interface", "0, of another time"}));
+  EXPECT_TRUE(IsRefused(RunWith(OTHER_MUJOCO_VERSION), {"no controller"}));
   // A library of the interface before there were parameters works, without them.
-  EXPECT_EQ(RunWith(OLD_INTERFACE_LIBRARY).exit_code, 0);
-  EXPECT_TRUE(IsRefused(RunWith(OLD_INTERFACE_LIBRARY, "--no-log --set controller.gain=3"),
+  EXPECT_EQ(RunWith(OLD_INTERFACE).exit_code, 0);
+  EXPECT_TRUE(IsRefused(RunWith(OLD_INTERFACE, "--no-log --set controller.gain=3"),
                         {"old_interface.so", "controller.gain", "asks for no parameters"}));
-  EXPECT_TRUE(Refused({"run", "lift", "--no-log", "--controller", PAPER_LAW_LIBRARY}, {"task"}));
+  EXPECT_TRUE(Refused({"run", "lift", "--no-log", "--controller", PAPER_LAW}, {"task"}));
 }
 
 TEST_F(OwnController, WhatALibraryInCDoesWrongIsOneLine) {
   const auto run = [&](const std::string& fault, const Words& more) {
-    return RunWith(FAULTY_C_LIBRARY, more, {.environment = {{"FAULT", fault}}});
+    return RunWith(FAULTY_C_CONTROLLER, more, {.environment = {{"FAULT", fault}}});
   };
   EXPECT_TRUE(
       IsRefused(run("protocol", "--no-log"), {"faulty_c_controller.so", "protocol 7", "this program of 1"}));
@@ -318,7 +318,7 @@ TEST_F(OwnController, EachFailureOfAProgramIsOneClearLine) {
 
 TEST_F(OwnController, ProgramsThatDoNotSpeakAreRefusedAtOnce) {
   EXPECT_TRUE(HasFailed(RunWith("/nowhere/law"), "exit code 127"));
-  EXPECT_TRUE(IsRefused(RunWith(ECHO_PROGRAM, "--no-log --set controller.gain=3"),
+  EXPECT_TRUE(IsRefused(RunWith(ECHO_CONTROLLER, "--no-log --set controller.gain=3"),
                         {"controller.gain", "takes none"}));
   WriteProgram(Path("law.py"), 5, "pass");
   std::string text = Read("law.py");
@@ -332,7 +332,7 @@ TEST_F(OwnController, ProgramsThatDoNotSpeakAreRefusedAtOnce) {
 
 // With no torque the robot falls: the transport works, and the run ends as it does with any bad controller.
 TEST_F(OwnController, TheEchoAnswersAndTheRobotFalls) {
-  EXPECT_TRUE(HasFailed(RunWith(ECHO_PROGRAM), "while settling"));
+  EXPECT_TRUE(HasFailed(RunWith(ECHO_CONTROLLER), "while settling"));
 }
 
 }  // namespace
