@@ -8,8 +8,7 @@
 
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
-#include "harness/cli/terminal.h"
+#include "harness/cli/report.h"
 #include "harness/descriptions/audit.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/engine/mjcf_file.h"
@@ -48,21 +47,21 @@ std::string FormatCondition(double condition) {
   return std::isfinite(condition) ? fmt::format("{:.2g}", condition) : "infinite";
 }
 
-void Print(const AuditRequest& request, const RobotDescription& robot, const AuditResult& result) {
+/// @param report gets the answer and what was found.
+void AddFindings(const AuditRequest& request, const RobotDescription& robot, const AuditResult& result,
+                 Report* report) {
   const std::string file = request.robot.filename().string();
   const auto counted = std::ranges::count_if(
       result.findings, [](const AuditFinding& finding) { return finding.level != AuditLevel::kNote; });
-  Answer answer{.word = "GOOD", .sentence = "nothing that a robot cannot have, and nothing suspicious."};
+  report->answer = {.word = "GOOD", .sentence = "nothing that a robot cannot have, and nothing suspicious."};
   if (counted > 0)
-    answer = {Answer::Tone::kBad, "FOUND",
-              fmt::format("{} {}.", counted,
-                          counted == 1 ? "thing that a robot cannot have or that looks like a fault"
-                                       : "things that a robot cannot have or that look like faults")};
-  PrintAnswer(answer);
-  if (request.quiet) return;
-  fmt::print("\n{}: {}, {} joints, {} links\ncondition number of M: {} (median of random states)\n\n",
-             robot.spec.name, file, robot.spec.joints.size(), robot.parts.size(),
-             FormatCondition(result.condition));
+    report->answer = {Answer::Tone::kBad, "FOUND",
+                      fmt::format("{} {}.", counted,
+                                  counted == 1 ? "thing that a robot cannot have or that looks like a fault"
+                                               : "things that a robot cannot have or that look like faults")};
+  report->details = fmt::format(
+      "\n{}: {}, {} joints, {} links\ncondition number of M: {} (median of random states)\n\n",
+      robot.spec.name, file, robot.spec.joints.size(), robot.parts.size(), FormatCondition(result.condition));
   for (const AuditFinding& finding : result.findings) {
     std::string line = fmt::format("{:<11}{}: {} {}", NameOf(finding.level),
                                    finding.line > 0 ? fmt::format("{}:{}", file, finding.line) : file,
@@ -71,35 +70,35 @@ void Print(const AuditRequest& request, const RobotDescription& robot, const Aud
       line += "; with a plausible body there M's condition number is " +
               FormatCondition(*finding.condition_without);
     }
-    fmt::print("{}\n", Wrap(line, 11));
+    report->Add(line, 11);
   }
   for (const std::string& note : robot.notes)
-    fmt::print("{}\n", Wrap(fmt::format("{:<11}{}: {}", "note", file, note), 11));
+    report->Add(fmt::format("{:<11}{}: {}", "note", file, note), 11);
 }
 
 /// A case for each kind of check, which fails with all that it found.
-std::string WriteAuditJUnit(const AuditRequest& request, const AuditResult& result) {
-  std::vector<JUnitCase> cases;
+void AddCases(const AuditResult& result, Report* report) {
+  std::vector<JUnitCase>& cases = report->cases;
   for (const char* check :
        {"mass", "inertia", "density", "com", "mirror", "load", "offset", "range", "axis", "name"})
-    cases.push_back({"audit", check, "", ""});
+    cases.push_back({"audit", check});
   for (const AuditFinding& finding : result.findings) {
     auto test = std::ranges::find(cases, finding.check, &JUnitCase::name);
-    if (test == cases.end()) test = cases.insert(test, {"audit", finding.check, "", ""});
+    if (test == cases.end()) test = cases.insert(test, {"audit", finding.check});
     std::string& text = finding.level == AuditLevel::kNote ? test->output : test->failure;
     text += (text.empty() ? "" : "\n") + finding.where + " " + finding.text;
   }
-  return WriteJUnit("dexcheck.audit." + request.robot.stem().string(), cases, 0.0);
 }
 
 int Run(const AuditRequest& request) {
   const RobotDescription robot = ReadDescription(request.robot, request.urdf);
-  OutputFile json(request.json_file), junit(request.junit_file);
+  ReportOutput files(request);
   const AuditResult result = AuditRobot(robot);
-  json.Write([&] { return ToJson(request, robot, result); });
-  junit.Write([&] { return WriteAuditJUnit(request, result); });
-  if (!json.is_stdout()) Print(request, robot, result);
-  return result.IsGood() ? kSuccess : kDisagreement;
+  Report report{.data = ToJson(request, robot, result), .suite = "audit." + request.robot.stem().string()};
+  AddFindings(request, robot, result, &report);
+  AddCases(result, &report);
+  if (!result.IsGood()) report.code = kDisagreement;
+  return files.Write(report);
 }
 
 }  // namespace

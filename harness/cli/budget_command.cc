@@ -8,9 +8,8 @@
 
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
+#include "harness/cli/report.h"
 #include "harness/cli/run_folder.h"
-#include "harness/cli/terminal.h"
 #include "harness/study/study_findings.h"
 
 namespace dexcheck::cli {
@@ -26,9 +25,12 @@ struct BudgetRequest : Outputs {
 /// Returns a prediction or an error in two digits; "-" where a law is not known, so that there is none.
 std::string Show(double value) { return std::isfinite(value) ? fmt::format("{:.2e}", value) : "-"; }
 
-void Print(const ErrorBudget& budget) {
-  fmt::print("{}: RMS and largest {}, {}\n\n", budget.scenario,
-             budget.of_joints ? "error of a joint" : "position error of the object", budget.unit);
+Report MakeReport(const ErrorBudget& budget) {
+  Report report{.details = fmt::format("{}: RMS and largest {}, {}\n\n", budget.scenario,
+                                       budget.of_joints ? "error of a joint" : "position error of the object",
+                                       budget.unit),
+                .data = ToJson(budget),
+                .page = [&] { return MakeBudgetPage(budget); }};
   std::vector<TableRow> rows = {{{"source", "alone", "largest", budget.of_joints ? "predicted" : "by (57)",
                                   "without it", "interaction"}}};
   for (const BudgetEntry& e : budget.entries) {
@@ -42,17 +44,26 @@ void Print(const ErrorBudget& budget) {
   rows.push_back({{"none of them", Show(budget.ideal.rms), Show(budget.ideal.max)}});
   // Errors up to where a run ended early are none of the motion's.
   if (budget.is_complete()) {
+    report.last =
+        fmt::format("{} sources: their errors add up to {:.2e} {}, all together make {:.2e} {}.\n",
+                    budget.entries.size(), budget.sum.rms, budget.unit, budget.all.rms, budget.unit);
     rows.push_back(
         {{"sum of the above", Show(budget.sum.rms), Show(budget.sum.max), Show(budget.predicted.rms)}});
     rows.push_back({{"all together", Show(budget.all.rms), Show(budget.all.max)}});
+  } else {
+    const std::string why = budget.failure.empty() ? "a run ended early" : budget.failure;
+    report.last = "INCOMPLETE: " + why + "\n";
+    report.failure = "incomplete: " + why;
   }
-  fmt::print("{}\n", FormatTable("<>>>>>", rows));
+  report.AddTable("<>>>>>", rows);
+  report.details += "\n";
+  return report;
 }
 
 int Run(const BudgetRequest& request) {
   const ScenarioFiles files = FindScenario(request.scenario, request.overrides.List(), request.seed);
   CatchInterrupts();
-  OutputFile json(request.json_file), page(RequirePageName(request.page_file));
+  ReportOutput outputs(request);
   std::unique_ptr<ProgressBar> bar;
   const auto progress = [&](long done, long total) {
     if (!bar) bar = std::make_unique<ProgressBar>("running", total, request.quiet);
@@ -61,19 +72,7 @@ int Run(const BudgetRequest& request) {
   const ErrorBudget budget =
       CalcErrorBudget(files.scenario, files.robot, files.mjcf, CountJobs(request.jobs), progress);
   if (bar) bar->Finish();
-  json.Write([&] { return ToJson(budget); });
-  page.Write([&] { return MakeBudgetPage(budget); });
-  if (!json.is_stdout() && !page.is_stdout()) {
-    if (!request.quiet) Print(budget);
-    if (budget.is_complete()) {
-      fmt::print("{} sources: their errors add up to {:.2e} {}, all together make {:.2e} {}.\n",
-                 budget.entries.size(), budget.sum.rms, budget.unit, budget.all.rms, budget.unit);
-    } else {
-      fmt::print("INCOMPLETE: {}\n", budget.failure.empty() ? "a run ended early" : budget.failure);
-    }
-  }
-  if (budget.is_complete()) return kSuccess;
-  return ReportFailure("incomplete: " + (budget.failure.empty() ? "a run ended early" : budget.failure));
+  return outputs.Write(MakeReport(budget));
 }
 
 }  // namespace

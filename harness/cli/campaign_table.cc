@@ -13,7 +13,6 @@
 #include "harness/base/interrupts.h"
 #include "harness/base/process_pool.h"
 #include "harness/base/version.h"
-#include "harness/cli/commands.h"
 #include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
@@ -103,7 +102,7 @@ void Campaign::Resume(const std::string& json_file, const std::vector<std::files
 void Campaign::Make(std::uint64_t jobs, bool quiet, const std::function<CampaignFault(size_t fault)>& make) {
   const size_t done = faults.size();
   ProgressBar bar("changing", static_cast<long>(total), quiet);
-  const auto run = [&](size_t i) { return FormatJson(cli::ToJson(make(done + i))); };
+  const auto run = [&](size_t i) { return FormatJson(ToJson(make(done + i))); };
   const auto take = [&](size_t /*i*/, const std::string& result) {
     faults.push_back(ReadFault(Json::parse(result)));
     bar.Update(static_cast<long>(faults.size()));
@@ -111,21 +110,26 @@ void Campaign::Make(std::uint64_t jobs, bool quiet, const std::function<Campaign
   RunJobs("a fault", total - done, CountJobs(jobs), run, take, IsInterrupted);
 }
 
-void Campaign::Print(bool quiet) const {
+Report Campaign::MakeReport() const {
   const std::vector<Row> rows = SumUp(faults);
   const Row& all = rows.back();
   const bool are_all = all.outcomes[3] == 0;
-  Answer answer{are_all ? Answer::Tone::kGood : Answer::Tone::kBad, are_all ? "ALL FOUND" : "SURVIVORS"};
-  answer.sentence = fmt::format("{} of {} faults that are possible and have an effect were found",
-                                all.outcomes[0], all.outcomes[0] + all.outcomes[3]);
-  if (names_causes) answer.sentence += fmt::format("; the cause is right in {}", all.cause_right);
-  if (all.with_part > 0)
-    answer.sentence += fmt::format(", the part in {} of {}", all.part_named, all.with_part);
-  answer.sentence += ".";
-  if (faults.size() < total)
-    answer.remarks.push_back(fmt::format("interrupted after {} of {} faults", faults.size(), total));
-  PrintAnswer(answer);
-  if (quiet) return;
+  Report report{
+      .answer = {are_all ? Answer::Tone::kGood : Answer::Tone::kBad, are_all ? "ALL FOUND" : "SURVIVORS"},
+      .data = head};
+  std::string& sentence = report.answer.sentence;
+  sentence = fmt::format("{} of {} faults that are possible and have an effect were found", all.outcomes[0],
+                         all.outcomes[0] + all.outcomes[3]);
+  if (names_causes) sentence += fmt::format("; the cause is right in {}", all.cause_right);
+  if (all.with_part > 0) sentence += fmt::format(", the part in {} of {}", all.part_named, all.with_part);
+  sentence += ".";
+  const bool is_complete = faults.size() == total;
+  if (is_complete) {
+    report.code = are_all ? kSuccess : kDisagreement;
+  } else {
+    report.SetIncomplete(static_cast<long>(faults.size()), static_cast<long>(total), "faults were made");
+  }
+  report.data["complete"] = is_complete;
   std::vector<TableRow> table = {{},
                                  {{"what was wrong", "faults", "found", "refused", "no effect", "survived",
                                    "cause", all.with_part > 0 ? "part" : ""}}};
@@ -135,33 +139,19 @@ void Campaign::Print(bool quiet) const {
     for (const int count : row.outcomes) line.cells.push_back(std::to_string(count));
     line.cells.push_back(std::to_string(row.cause_right));
     line.cells.push_back(row.with_part > 0 ? fmt::format("{} of {}", row.part_named, row.with_part) : "");
-  }
-  fmt::print("{}", FormatTable("<>>>>>>>", table));
-  for (const CampaignFault& fault : faults) {
-    if (!fault.exception.empty()) fmt::print("{}\n", Wrap(fault.exception, 2));
-  }
-}
-
-Json Campaign::ToJson() const {
-  Json json = head;
-  json["complete"] = faults.size() == total;
-  json["kinds"] = Json::object();
-  for (const Row& row : SumUp(faults)) {
     const auto [found, refused, no_effect, survived] = row.outcomes;
-    json["kinds"][row.kind] = {{"faults", row.faults},         {"found", found},
-                               {"refused", refused},           {"no_effect", no_effect},
-                               {"survived", survived},         {"cause_right", row.cause_right},
-                               {"part_named", row.part_named}, {"with_a_part", row.with_part}};
+    report.data["kinds"][row.kind] = {{"faults", row.faults},         {"found", found},
+                                      {"refused", refused},           {"no_effect", no_effect},
+                                      {"survived", survived},         {"cause_right", row.cause_right},
+                                      {"part_named", row.part_named}, {"with_a_part", row.with_part}};
   }
-  json["faults"] = Json::array();
-  for (const CampaignFault& fault : faults) json["faults"].push_back(cli::ToJson(fault));
-  return json;
-}
-
-ExitCode Campaign::ToExitCode() const {
-  if (faults.size() < total)
-    return ReportFailure(fmt::format("interrupted after {} of {} faults", faults.size(), total));
-  return SumUp(faults).back().outcomes[3] > 0 ? kDisagreement : kSuccess;
+  report.AddTable("<>>>>>>>", table);
+  report.data["faults"] = Json::array();
+  for (const CampaignFault& fault : faults) {
+    report.data["faults"].push_back(ToJson(fault));
+    if (!fault.exception.empty()) report.Add(fault.exception);
+  }
+  return report;
 }
 
 }  // namespace dexcheck::cli

@@ -10,9 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "harness/cli/command_line.h"
-#include "harness/cli/output_file.h"
-#include "harness/cli/terminal.h"
+#include "harness/cli/report.h"
 #include "harness/diagnosis/mutation.h"
 
 namespace dexcheck::cli {
@@ -42,12 +40,9 @@ struct Campaign {
   /// Makes the others, so many at a time as CountJobs says, with a progress bar, until the user interrupts.
   /// @param make makes one in a process of its own. @throws Error when such a process dies.
   void Make(std::uint64_t jobs, bool quiet, const std::function<CampaignFault(size_t fault)>& make);
-  /// Prints a line for each kind of fault, the exceptions, and the verdict; the verdict alone when quiet.
-  void Print(bool quiet) const;
-  /// The JSON that a file gets: `head`, "complete", "kinds" and "faults".
-  [[nodiscard]] Json ToJson() const;
-  /// 3 when not all were made, which is said on standard error; else 1 when one survived.
-  [[nodiscard]] ExitCode ToExitCode() const;
+  /// Returns the verdict, a line for each kind of fault and the exceptions. The data are `head`, "complete",
+  /// "kinds" and "faults", from which Resume goes on.
+  [[nodiscard]] Report MakeReport() const;
 };
 
 }  // namespace dexcheck::cli

@@ -10,8 +10,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
-#include "harness/cli/terminal.h"
+#include "harness/cli/report.h"
 #include "harness/report/page_frame.h"
 #include "harness/report/run_comparison.h"
 #include "harness/report/run_data.h"
@@ -42,8 +41,8 @@ std::string Show(const std::optional<double>& value) { return value ? FormatShor
 
 std::string ShowUnit(const std::string& unit) { return unit == "1" ? "" : unit; }
 
-/// Prints a line for each number: a value of each run, marked where it fails, and its ratios to the first.
-void PrintNumbers(const std::vector<ComparedNumber>& numbers, bool all) {
+/// Adds a line for each number: a value of each run, marked where it fails, and its ratios to the first.
+void AddNumbers(const std::vector<ComparedNumber>& numbers, bool all, Report* report) {
   std::vector<TableRow> rows;
   std::string align = "<";
   for (const ComparedNumber& number : numbers) {
@@ -56,14 +55,14 @@ void PrintNumbers(const std::vector<ComparedNumber>& numbers, bool all) {
     row.cells.push_back(ShowUnit(number.unit));
     for (size_t i = 1; i < number.values.size(); ++i) row.cells.push_back("x " + Show(number.CalcRatio(i)));
   }
-  fmt::print("{}", FormatTable(align, rows));
+  report->AddTable(align, rows);
 }
 
-void PrintSignals(const RunComparison& comparison, bool all) {
+void AddSignals(const RunComparison& comparison, bool all, Report* report) {
   const auto equal = std::ranges::count_if(
       comparison.signals, [](const SignalDifference& signal) { return signal.difference == 0.0; });
-  fmt::print("\nsignals: {} of {} are equal bit for bit; differences, over sizes\n", equal,
-             comparison.signals.size());
+  report->details += fmt::format("\nsignals: {} of {} are equal bit for bit; differences, over sizes\n",
+                                 equal, comparison.signals.size());
   std::vector<TableRow> rows;
   for (const SignalDifference& signal : comparison.signals) {
     if (!all && (signal.difference == 0.0 || rows.size() == kMostPrinted)) break;
@@ -71,29 +70,31 @@ void PrintSignals(const RunComparison& comparison, bool all) {
                      FormatShort(signal.difference), ShowUnit(signal.unit), FormatShort(signal.fraction()),
                      fmt::format("at {:.3f} s", signal.at_time)}});
   }
-  fmt::print("{}", FormatTable("<<><><", rows));
+  report->AddTable("<<><><", rows);
   if (!comparison.not_compared.empty())
-    fmt::print("  {} signals are not in all runs\n", comparison.not_compared.size());
+    report->Add(fmt::format("  {} signals are not in all runs", comparison.not_compared.size()));
 }
 
-void Print(const CompareRequest& request, const RunComparison& comparison) {
-  fmt::print("\n");
+void AddDetails(const CompareRequest& request, const RunComparison& comparison, Report* report) {
+  std::string& text = report->details;
+  text += "\n";
   for (size_t i = 0; i < request.run_folders.size(); ++i) {
-    fmt::print("{}  {}: {}\n", static_cast<char>('A' + i), request.run_folders[i], comparison.verdicts[i]);
+    text += fmt::format("{}  {}: {}\n", static_cast<char>('A' + i), request.run_folders[i],
+                        comparison.verdicts[i]);
   }
-  fmt::print("\ninputs{}\n", comparison.inputs.empty() ? ": the same" : "");
+  text += fmt::format("\ninputs{}\n", comparison.inputs.empty() ? ": the same" : "");
   for (const InputDifference& input : comparison.inputs) {
-    fmt::print("  {}\n", input.name);
+    text += fmt::format("  {}\n", input.name);
     for (size_t i = 0; i < input.values.size(); ++i)
-      fmt::print("    {}  {}\n", static_cast<char>('A' + i),
-                 input.values[i].empty() ? "none" : input.values[i]);
+      text += fmt::format("    {}  {}\n", static_cast<char>('A' + i),
+                          input.values[i].empty() ? "none" : input.values[i]);
   }
-  fmt::print("\nresults\n");
-  PrintNumbers(comparison.results, true);
+  text += "\nresults\n";
+  AddNumbers(comparison.results, true, report);
   const auto failing = std::ranges::count_if(comparison.checks, std::mem_fn(&ComparedNumber::fails_anywhere));
-  fmt::print("\nchecks: {} of {} are above their bounds (!)\n", failing, comparison.checks.size());
-  PrintNumbers(comparison.checks, request.all);
-  PrintSignals(comparison, request.all);
+  text += fmt::format("\nchecks: {} of {} are above their bounds (!)\n", failing, comparison.checks.size());
+  AddNumbers(comparison.checks, request.all, report);
+  AddSignals(comparison, request.all, report);
 }
 
 int Run(CompareRequest request) {
@@ -113,17 +114,16 @@ int Run(CompareRequest request) {
     runs.push_back(std::make_unique<RunData>(folder));
     pointers.push_back(runs.back().get());
   }
-  OutputFile json(request.json_file), page(RequirePageName(request.page_file));
+  ReportOutput files(request);
   const RunComparison comparison = CompareRuns(pointers, request.options);
-  const bool prints = !json.is_stdout();
-  if (prints) PrintAnswer(MakeAnswer(comparison));
-  if (prints && !request.quiet) Print(request, comparison);
-  json.Write([&] { return ToJson(comparison, request.run_folders); });
-  page.Write([&] { return MakeComparisonPage(pointers, request.run_folders, comparison); });
-  if (!request.page_file.empty() && prints && !request.quiet) fmt::print("page: {}\n", request.page_file);
-  if (!request.tolerance || comparison.IsSame()) return kSuccess;
-  if (comparison.signals.empty()) throw InputError("--tolerance: no signal was compared");
-  return kDisagreement;
+  Report report{.answer = MakeAnswer(comparison),
+                .data = ToJson(comparison, request.run_folders),
+                .page = [&] { return MakeComparisonPage(pointers, request.run_folders, comparison); }};
+  AddDetails(request, comparison, &report);
+  if (request.tolerance && !comparison.IsSame()) report.code = kDisagreement;
+  const ExitCode code = files.Write(report);
+  if (code != kSuccess && comparison.signals.empty()) throw InputError("--tolerance: no signal was compared");
+  return code;
 }
 
 }  // namespace

@@ -11,8 +11,6 @@
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/consistency_report.h"
-#include "harness/cli/output_file.h"
-#include "harness/cli/terminal.h"
 #include "harness/comparison/consistency.h"
 #include "harness/corrections/read_printed.h"
 #include "harness/report/page.h"
@@ -29,10 +27,9 @@ void TakeFiles(ConsistencyRequest* request) {
   }
 }
 
-std::string MakePage(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {
+std::string MakePage(const ConsistencyRequest& request, const Comparison& comparison, Json result) {
   const DescriptionFile first(request.files.robot, request.urdf);
   const DescriptionFile second(request.files.mjcf, request.urdf);
-  Json result = ToJson(request, comparison, code);
   for (size_t i = 0; i < result["causes"].size(); ++i) {
     for (const Site& site : comparison.causes->items[i].sites)
       result["causes"][i]["sites"].push_back(NameSite(site.kind));
@@ -42,7 +39,6 @@ std::string MakePage(const ConsistencyRequest& request, const Comparison& compar
 
 int Run(ConsistencyRequest request) {
   TakeFiles(&request);
-  RequirePageName(request.page_file);
   if (!request.page_file.empty() && request.has_results())
     throw InputError("consistency: --page must have two files");
   for (const std::string& joint : request.lock) AddHeldJoint(joint, &request.options.part);
@@ -54,25 +50,14 @@ int Run(ConsistencyRequest request) {
   if (request.has_results() && !request.options.part.empty())
     throw InputError("consistency: --only, --lock and --ignore BODY must have two files");
   CatchInterrupts();
-  OutputFile json(request.json_file), junit(request.junit_file), page(request.page_file);
+  ReportOutput files(request);
   ProgressBar bar("comparing", request.options.samples, request.quiet);
   const Comparison comparison = Compare(request, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
-  const ConsistencyResult& result = comparison.result;
-  ExitCode code = request.IsWhole(result) ? kSuccess : kFailure;
-  if (!comparison.Agrees()) code = kDisagreement;
-  json.Write([&] { return ToJson(request, comparison, code); });
-  junit.Write([&] { return WriteJUnit(request, comparison); });
-  page.Write([&] { return MakePage(request, comparison, code); });
-  if (!json.is_stdout()) {
-    PrintAnswer(MakeAnswer(request, comparison, TryRepair(request, comparison)));
-    if (!request.quiet) PrintTable(request, comparison);
-    if (!request.page_file.empty()) fmt::print("page: {}\n", request.page_file);
-  }
-  if (code == kFailure)
-    return ReportFailure(
-        fmt::format("only {} of {} states were compared", result.samples, request.options.samples));
-  return code;
+  Report report =
+      MakeReport(request, comparison, files.prints() ? TryRepair(request, comparison) : RepairTrial());
+  report.page = [&] { return MakePage(request, comparison, report.data); };
+  return files.Write(report);
 }
 
 }  // namespace

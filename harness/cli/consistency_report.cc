@@ -9,8 +9,6 @@
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
 #include "harness/base/console.h"
-#include "harness/cli/output_file.h"
-#include "harness/cli/terminal.h"
 #include "harness/comparison/consistency.h"
 #include "harness/comparison/file_differences.h"
 #include "harness/engine/engine.h"
@@ -180,6 +178,109 @@ Comparison JudgeAsAsked(const ConsistencyRequest& request, const CompareBy& comp
   return comparison;
 }
 
+Json MakeData(const ConsistencyRequest& request, const Comparison& comparison, const Report& report) {
+  const RobotModel& model = *comparison.model;
+  const ConsistencyResult& result = comparison.result;
+  Json json = {{"robot", comparison.first.string()},
+               {"mjcf", comparison.second.string()},
+               {"mujoco", mj_versionString()},
+               {"samples", result.samples},
+               {"samples_requested", request.options.samples},
+               {"seed", request.options.seed},
+               {"seconds", result.seconds},
+               {"verdict", report.code == kDisagreement ? "disagreement"
+                           : report.failure.empty()     ? "pass"
+                                                        : "failed"},
+               {"outcome", NameOutcome(request, comparison)}};
+  json["notes"] = comparison.notes;
+  for (const std::string& note : comparison.not_compared) json["notes"].push_back(note);
+  json["differences"] = ListDifferences(comparison);
+  json["not_compared"] = comparison.not_compared;
+  json["without_effect"] = comparison.without_effect;
+  if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
+  json["checks"] = Json::object();
+  for (const auto* records : {&result.constants.records, &result.terms}) {
+    for (const CheckRecord& record : *records) json["checks"][record.name] = DescribeRecord(record, model);
+  }
+  if (comparison.digits) json["digits"] = ToJson(*comparison.digits, model);
+  json["findings"] = Json::array();
+  for (const ConstantFinding& finding : result.constants.findings) {
+    json["findings"].push_back({{"check", finding.check},
+                                {"where", finding.where},
+                                {"model", finding.model},
+                                {"engine", finding.engine}});
+    if (!finding.effect.empty()) json["findings"].back()["effect"] = finding.effect;
+  }
+  json["engine_notes"] = Json::array();
+  for (const ConstantNote& note : result.constants.notes)
+    json["engine_notes"].push_back({{"kind", note.kind}, {"text", note.text}});
+  AddCauses(comparison, &json);
+  return json;
+}
+
+/// Adds what failed first, then where to look.
+void AddTables(const ConsistencyRequest& request, const Comparison& comparison, Report* report) {
+  const RobotModel& model = *comparison.model;
+  const ConsistencyResult& result = comparison.result;
+  report->details =
+      fmt::format("\n{}: {} against {}{}\n{} random states (seed {}), {:.1f} s\n\n", model.name(),
+                  comparison.first.filename().string(), comparison.second.filename().string(),
+                  comparison.with_engine ? std::string(", MuJoCo ") + mj_versionString() : "", result.samples,
+                  request.options.seed, result.seconds);
+
+  const auto list = [&](const char* title, const std::vector<std::string>& lines) {
+    if (lines.empty()) return;
+    report->details += fmt::format("{}:\n", title);
+    for (const std::string& line : lines) report->Add("  " + line, 4);
+    report->details += "\n";
+  };
+  list("not compared", comparison.not_compared);
+  list("differs, does not act on these terms", comparison.without_effect);
+  list("worth knowing", comparison.notes);
+  std::vector<TableRow> rows;
+  const std::vector<CheckRecord>& constants = result.constants.records;
+  if (!constants.empty()) AddRecords("constant", constants, comparison, nullptr, &rows);
+  if (!result.constants.notes.empty()) {
+    rows.push_back({{},
+                    fmt::format("{} notes on what only a run has (contacts, solver, motors' limits): --json",
+                                result.constants.notes.size())});
+  }
+  if (!rows.empty()) rows.emplace_back();
+  AddRecords("term", result.terms, comparison, &model, &rows);
+  report->AddTable(ListsAll(comparison) ? "<>>>><" : "<>><", rows);
+  const std::string bounds = request.judging.Find()
+                                 ? "bounds are those of rounding or the tolerance given, whichever is wider"
+                                 : "bounds follow from rounding";
+  const std::string digits =
+      comparison.digits
+          ? fmt::format(
+                " Larger differences were compared with the printed precision of the files ({} states).",
+                comparison.digits->states)
+          : "";
+  report->Add("\nErrors are relative to each term's own scale; " + bounds + " (README.md)." + digits +
+                  " --json says where each is worst.",
+              0);
+}
+
+/// Adds each check as a case, and each cause.
+void AddCases(const Comparison& comparison, Report* report) {
+  const RobotModel& model = *comparison.model;
+  const ConsistencyResult& result = comparison.result;
+  const auto add = [&](const std::string& group, const CheckRecord& record) {
+    report->AddCase(group, record, Describe(record.where, model, model.num_base_velocities()));
+  };
+  for (const CheckRecord& record : result.constants.records) add("constant", record);
+  for (const CheckRecord& record : result.terms) add("term", record);
+  // A constant that the engine's model alone has belongs to no check of its own.
+  for (const ConstantFinding& finding : result.constants.findings) {
+    if (std::ranges::find(report->cases, finding.check, &JUnitCase::name) == report->cases.end())
+      report->cases.push_back({"constant", finding.check, finding.where});
+  }
+  if (!comparison.causes) return;
+  for (const CorrectionItem& cause : comparison.causes->items)
+    report->cases.push_back({"cause", cause.id, cause.text});
+}
+
 }  // namespace
 
 void AddJudgingOptions(CLI::App* command, ConsistencyRequest* request) {
@@ -239,48 +340,6 @@ void AddCauses(const Comparison& comparison, Json* json) {
     (*json)["unexplained"].push_back(line);
 }
 
-void PrintTable(const ConsistencyRequest& request, const Comparison& comparison) {
-  const RobotModel& model = *comparison.model;
-  const ConsistencyResult& result = comparison.result;
-  fmt::print("\n{}: {} against {}{}\n{} random states (seed {}), {:.1f} s\n\n", model.name(),
-             comparison.first.filename().string(), comparison.second.filename().string(),
-             comparison.with_engine ? std::string(", MuJoCo ") + mj_versionString() : "", result.samples,
-             request.options.seed, result.seconds);
-
-  const auto list = [](const char* title, const std::vector<std::string>& lines) {
-    if (lines.empty()) return;
-    fmt::print("{}:\n", title);
-    for (const std::string& line : lines) fmt::print("{}\n", Wrap("  " + line, 4));
-    fmt::print("\n");
-  };
-  list("not compared", comparison.not_compared);
-  list("differs, does not act on these terms", comparison.without_effect);
-  list("worth knowing", comparison.notes);
-  std::vector<TableRow> rows;
-  const std::vector<CheckRecord>& constants = result.constants.records;
-  if (!constants.empty()) AddRecords("constant", constants, comparison, nullptr, &rows);
-  if (!result.constants.notes.empty()) {
-    rows.push_back({{},
-                    fmt::format("{} notes on what only a run has (contacts, solver, motors' limits): --json",
-                                result.constants.notes.size())});
-  }
-  if (!rows.empty()) rows.emplace_back();
-  AddRecords("term", result.terms, comparison, &model, &rows);
-  fmt::print("{}", FormatTable(ListsAll(comparison) ? "<>>>><" : "<>><", rows));
-  const std::string bounds = request.judging.Find()
-                                 ? "bounds are those of rounding or the tolerance given, whichever is wider"
-                                 : "bounds follow from rounding";
-  const std::string digits =
-      comparison.digits
-          ? fmt::format(
-                " Larger differences were compared with the printed precision of the files ({} states).",
-                comparison.digits->states)
-          : "";
-  fmt::print("\n{}\n", Wrap("Errors are relative to each term's own scale; " + bounds + " (README.md)." +
-                                digits + " --json says where each is worst.",
-                            0));
-}
-
 Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& comparison,
                   const RepairTrial& repair) {
   const ConsistencyResult& result = comparison.result;
@@ -315,73 +374,22 @@ Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& compariso
     }
   }
   if (!repair.command.empty()) answer.remarks.push_back("repair: " + repair.command);
-  if (!request.IsWhole(result))
-    answer.remarks.push_back(
-        fmt::format("interrupted: these are {} of {} samples", result.samples, request.options.samples));
   return answer;
 }
 
-Json ToJson(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code) {
-  const RobotModel& model = *comparison.model;
+Report MakeReport(const ConsistencyRequest& request, const Comparison& comparison,
+                  const RepairTrial& repair) {
   const ConsistencyResult& result = comparison.result;
-  Json json = {{"robot", comparison.first.string()},
-               {"mjcf", comparison.second.string()},
-               {"mujoco", mj_versionString()},
-               {"samples", result.samples},
-               {"samples_requested", request.options.samples},
-               {"seed", request.options.seed},
-               {"seconds", result.seconds},
-               {"verdict", code == kSuccess        ? "pass"
-                           : code == kDisagreement ? "disagreement"
-                                                   : "failed"},
-               {"outcome", NameOutcome(request, comparison)}};
-  json["notes"] = comparison.notes;
-  for (const std::string& note : comparison.not_compared) json["notes"].push_back(note);
-  json["differences"] = ListDifferences(comparison);
-  json["not_compared"] = comparison.not_compared;
-  json["without_effect"] = comparison.without_effect;
-  if (const std::optional<double> tolerance = request.judging.Find()) json["tolerance"] = *tolerance;
-  json["checks"] = Json::object();
-  for (const auto* records : {&result.constants.records, &result.terms}) {
-    for (const CheckRecord& record : *records) json["checks"][record.name] = DescribeRecord(record, model);
-  }
-  if (comparison.digits) json["digits"] = ToJson(*comparison.digits, model);
-  json["findings"] = Json::array();
-  for (const ConstantFinding& finding : result.constants.findings) {
-    json["findings"].push_back({{"check", finding.check},
-                                {"where", finding.where},
-                                {"model", finding.model},
-                                {"engine", finding.engine}});
-    if (!finding.effect.empty()) json["findings"].back()["effect"] = finding.effect;
-  }
-  json["engine_notes"] = Json::array();
-  for (const ConstantNote& note : result.constants.notes)
-    json["engine_notes"].push_back({{"kind", note.kind}, {"text", note.text}});
-  AddCauses(comparison, &json);
-  return json;
-}
-
-std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comparison) {
-  const RobotModel& model = *comparison.model;
-  const ConsistencyResult& result = comparison.result;
-  std::vector<JUnitCase> cases;
-  const auto add = [&](const std::string& group, const CheckRecord& record) {
-    cases.push_back(MakeJUnitCase(group, record, Describe(record.where, model, model.num_base_velocities())));
-  };
-  for (const CheckRecord& record : result.constants.records) add("constant", record);
-  for (const CheckRecord& record : result.terms) add("term", record);
-  // A constant that the engine's model alone has belongs to no check of its own.
-  for (const ConstantFinding& finding : result.constants.findings) {
-    const bool has_case =
-        std::ranges::any_of(cases, [&](const JUnitCase& test) { return test.name == finding.check; });
-    if (!has_case) cases.push_back({"constant", finding.check, finding.where, ""});
-  }
-  if (comparison.causes) {
-    for (const CorrectionItem& cause : comparison.causes->items)
-      cases.push_back({"cause", cause.id, cause.text, ""});
-  }
-  return WriteJUnit("dexcheck.consistency." + comparison.first.stem().string(), cases, result.seconds,
-                    request.IsWhole(result) ? "" : "interrupted");
+  Report report{.answer = MakeAnswer(request, comparison, repair),
+                .suite = "consistency." + comparison.first.stem().string(),
+                .seconds = result.seconds};
+  if (!comparison.Agrees()) report.code = kDisagreement;
+  if (!request.IsWhole(result))
+    report.SetIncomplete(result.samples, request.options.samples, "states were compared");
+  report.data = MakeData(request, comparison, report);
+  AddTables(request, comparison, &report);
+  AddCases(comparison, &report);
+  return report;
 }
 
 }  // namespace dexcheck::cli

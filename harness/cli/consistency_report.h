@@ -1,15 +1,14 @@
 #pragma once
 
-// The request of `consistency`, its results, and how they are printed.
+// The request of `consistency`, and the report of its results.
 
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "harness/base/answer.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
+#include "harness/cli/report.h"
 #include "harness/comparison/file_comparison.h"
 
 namespace dexcheck::cli {
@@ -62,8 +61,6 @@ Comparison Compare(const ConsistencyRequest& request, DescriptionFile* robot, De
 /// A compared term or constant: its record, where it was worst, and the two values there.
 Json DescribeRecord(const CheckRecord& record, const RobotModel& model);
 
-/// Large results first fail, then where to look: what a person reads.
-void PrintTable(const ConsistencyRequest& request, const Comparison& comparison);
 /// The result of a repair that was tried in memory.
 struct RepairTrial {
   std::string command = {};  ///< Writes the corrected file; empty if the file would still differ.
@@ -75,11 +72,9 @@ RepairTrial TryRepair(const ConsistencyRequest& request, const Comparison& compa
 
 /// Returns whether the two agree, and if not, why.
 Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& comparison, const RepairTrial& repair);
-/// Returns the results as JSON.
-Json ToJson(const ConsistencyRequest& request, const Comparison& comparison, ExitCode code);
 
-/// Writes the results as a JUnit document.
-std::string WriteJUnit(const ConsistencyRequest& request, const Comparison& comparison);
+/// Returns what was compared and how it agrees. @param repair that the answer tells of.
+Report MakeReport(const ConsistencyRequest& request, const Comparison& comparison, const RepairTrial& repair);
 
 /// Adds "causes" and "unexplained", which is all that differs where terms alone are compared.
 void AddCauses(const Comparison& comparison, Json* json);

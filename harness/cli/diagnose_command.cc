@@ -8,8 +8,6 @@
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/consistency_report.h"
-#include "harness/cli/output_file.h"
-#include "harness/cli/terminal.h"
 #include "harness/comparison/file_differences.h"
 #include "harness/corrections/read_printed.h"
 #include "harness/corrections/write_repaired.h"
@@ -80,23 +78,24 @@ int Run(DiagnoseRequest request) {
   DescriptionFile first(request.files.robot, request.urdf);
   DescriptionFile second(request.files.mjcf, request.urdf);
   CatchInterrupts();
-  OutputFile json(request.json_file), output(request.repaired_file);
+  ReportOutput files(request);
+  OutputFile output(request.repaired_file);
   ProgressBar bar("comparing", request.options.samples, request.quiet);
   const Comparison comparison =
       Compare(request, &first, &second, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
-  json.Write([&] { return ToJson(request, comparison); });
-  if (!json.is_stdout()) {
-    RepairTrial repair = TryRepair(request, comparison);
-    if (output.exists()) repair.command.clear();  // it is being written
-    PrintAnswer(MakeAnswer(request, comparison, repair));
+  RepairTrial repair;
+  if (files.prints()) repair = TryRepair(request, comparison);
+  if (output.exists()) repair.command.clear();  // it is being written
+  Report report{.answer = MakeAnswer(request, comparison, repair), .data = ToJson(request, comparison)};
+  if (IsInterrupted()) {
+    report.failure = "interrupted";
+  } else {
+    if (output.exists())
+      report.last = Wrap(WriteRepair(request, first, &second, comparison, &output), 2) + "\n";
+    report.code = comparison.Agrees() ? kSuccess : kDisagreement;
   }
-  if (IsInterrupted()) return ReportFailure("interrupted");
-  if (output.exists()) {
-    const std::string line = WriteRepair(request, first, &second, comparison, &output);
-    if (!json.is_stdout()) fmt::print("{}\n", Wrap(line, 2));
-  }
-  return comparison.Agrees() ? kSuccess : kDisagreement;
+  return files.Write(report);
 }
 
 }  // namespace

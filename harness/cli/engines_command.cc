@@ -10,8 +10,6 @@
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/consistency_report.h"
-#include "harness/cli/output_file.h"
-#include "harness/cli/terminal.h"
 #include "harness/comparison/engine_comparison.h"
 #include "harness/descriptions/read_description.h"
 
@@ -48,20 +46,21 @@ std::vector<std::string> NamesOf(const std::vector<size_t>& group, const EngineC
   return names;
 }
 
-void PrintTable(const EnginesRequest& request, const RobotModel& model,
-                const EngineComparisonResult& result) {
-  fmt::print("\n{}: {}\n{} random states (seed {}), {} engines\n\n", model.name(),
-             request.robot.filename().string(), result.samples, request.options.states.seed,
-             result.names.size());
-  for (const std::string& note : result.notes) fmt::print("{}\n", Wrap("  " + note, 4));
-  for (const std::string& absent : result.absent) fmt::print("{}\n", Wrap("  not compared: " + absent, 4));
-  if (!result.notes.empty() || !result.absent.empty()) fmt::print("\n");
+void AddTables(const EnginesRequest& request, const RobotModel& model, const EngineComparisonResult& result,
+               Report* report) {
+  report->details = fmt::format("\n{}: {}\n{} random states (seed {}), {} engines\n\n", model.name(),
+                                request.robot.filename().string(), result.samples,
+                                request.options.states.seed, result.names.size());
+  for (const std::string& note : result.notes) report->Add("  " + note, 4);
+  for (const std::string& absent : result.absent) report->Add("  not compared: " + absent, 4);
+  if (!result.notes.empty() || !result.absent.empty()) report->details += "\n";
 
   const auto letter = [](size_t provider) { return std::string(1, static_cast<char>('A' + provider)); };
   const auto name = [&](const ComparedPair& pair) {
     return letter(pair.first) + " - " + letter(pair.second);
   };
-  for (size_t i = 0; i < result.names.size(); ++i) fmt::print("{}  {}\n", letter(i), result.names[i]);
+  for (size_t i = 0; i < result.names.size(); ++i)
+    report->details += letter(i) + "  " + result.names[i] + "\n";
   std::vector<std::string> terms;
   for (const ComparedPair& pair : result.pairs) {
     for (const CheckRecord& record : pair.terms) {
@@ -77,9 +76,9 @@ void PrintTable(const EnginesRequest& request, const RobotModel& model,
       rows.push_back({{term}});
       for (size_t i = begin; i < end; ++i) rows.back().cells.push_back(FormatCell(result.pairs[i], term));
     }
-    fmt::print("{}", FormatTable("<>>>>>>", rows));
+    report->AddTable("<>>>>>>", rows);
   }
-  fmt::print("\nwhere it is worst\n");
+  report->details += "\nwhere it is worst\n";
   const int base = model.num_base_velocities();
   for (const ComparedPair& pair : result.pairs) {
     const CheckRecord* const worst = FindWorst(pair);
@@ -87,15 +86,16 @@ void PrintTable(const EnginesRequest& request, const RobotModel& model,
         worst == nullptr ? "no term in common"
                          : fmt::format("{} {}, state {}", worst->name, Describe(worst->where, model, base),
                                        static_cast<long>(worst->at));
-    fmt::print("{}\n", Wrap(name(pair) + "  " + where, 7));
+    report->Add(name(pair) + "  " + where, 7);
   }
-  const std::string legend =
-      fmt::format("Differences are relative to each term's own scale; those above {:g} are marked by \"!\".",
-                  request.options.tolerance);
-  fmt::print("\n{}\n", Wrap(legend, 0));
+  report->Add(
+      fmt::format("\nDifferences are relative to each term's own scale; those above {:g} are marked by "
+                  "\"!\".",
+                  request.options.tolerance),
+      0);
 }
 
-Answer AnswerForEngines(const EnginesRequest& request, const EngineComparisonResult& result) {
+Answer AnswerForEngines(const EngineComparisonResult& result) {
   Answer answer{.word = "AGREE",
                 .sentence = JoinNames(result.names) + " agree in all terms that they share."};
   if (!result.Agrees()) {
@@ -104,9 +104,6 @@ Answer AnswerForEngines(const EnginesRequest& request, const EngineComparisonRes
       answer.causes.push_back(JoinNames(NamesOf(group, result)) +
                               (group.size() > 1 ? " agree" : " stands alone"));
   }
-  if (result.samples < request.options.states.samples)
-    answer.remarks.push_back(fmt::format("interrupted: these are {} of {} states", result.samples,
-                                         request.options.states.samples));
   return answer;
 }
 
@@ -136,25 +133,30 @@ Json ToJson(const EnginesRequest& request, const RobotModel& model, const Engine
   return json;
 }
 
-/// A case for each pair and term.
-std::string WriteEnginesJUnit(const EnginesRequest& request, const RobotModel& model,
-                              const EngineComparisonResult& result) {
-  std::vector<JUnitCase> cases;
+Report MakeReport(const EnginesRequest& request, const RobotModel& model,
+                  const EngineComparisonResult& result) {
+  Report report{.answer = AnswerForEngines(result),
+                .data = ToJson(request, model, result),
+                .suite = "engine_comparison." + request.robot.stem().string()};
+  AddTables(request, model, result, &report);
   for (const ComparedPair& pair : result.pairs) {
-    for (const CheckRecord& record : pair.terms) {
-      cases.push_back(MakeJUnitCase(result.names[pair.first] + " - " + result.names[pair.second], record,
-                                    Describe(record.where, model, model.num_base_velocities())));
-    }
+    for (const CheckRecord& record : pair.terms)
+      report.AddCase(result.names[pair.first] + " - " + result.names[pair.second], record,
+                     Describe(record.where, model, model.num_base_velocities()));
   }
-  return WriteJUnit("dexcheck.engine_comparison." + request.robot.stem().string(), cases, 0.0,
-                    result.lacks_requested ? JoinNames(result.absent) : "");
+  if (!result.Agrees()) report.code = kDisagreement;
+  if (result.samples < request.options.states.samples)
+    report.SetIncomplete(result.samples, request.options.states.samples, "states were compared");
+  if (result.lacks_requested)
+    report.failure = "a library that was requested is not there: " + JoinNames(result.absent);
+  return report;
 }
 
 int Run(EnginesRequest request) {
   CatchInterrupts();
   request.options.tolerance = std::pow(10.0, -request.digits);
   request.options.programs_folder = FindInstalled("libexec/dexcheck");
-  OutputFile json(request.json_file), junit(request.junit_file);
+  ReportOutput files(request);
   const DescriptionFile file(request.robot, request.urdf);
   const RobotDescription robot = file.Describe();
   const RobotModel model(robot.spec);
@@ -162,21 +164,7 @@ int Run(EnginesRequest request) {
   const EngineComparisonResult result =
       RunEngineComparison(file, robot, request.options, [&](long samples) { return bar.GoOn(samples); });
   bar.Finish();
-  const bool is_whole = result.samples >= request.options.states.samples && !result.lacks_requested;
-  ExitCode code = is_whole ? kSuccess : kFailure;
-  if (!result.Agrees()) code = kDisagreement;
-  json.Write([&] { return ToJson(request, model, result); });
-  junit.Write([&] { return WriteEnginesJUnit(request, model, result); });
-  if (!json.is_stdout()) {
-    PrintAnswer(AnswerForEngines(request, result));
-    if (!request.quiet) PrintTable(request, model, result);
-  }
-  if (code == kFailure)
-    return ReportFailure(result.lacks_requested
-                             ? "a library that was requested is not there"
-                             : fmt::format("only {} of {} states were compared", result.samples,
-                                           request.options.states.samples));
-  return code;
+  return files.Write(MakeReport(request, model, result));
 }
 
 }  // namespace

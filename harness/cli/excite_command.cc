@@ -12,9 +12,8 @@
 #include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
+#include "harness/cli/report.h"
 #include "harness/cli/run_folder.h"
-#include "harness/cli/terminal.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/engine/clearance.h"
 #include "harness/recordings/motion_design.h"
@@ -68,19 +67,29 @@ Json ToJson(const RobotModel& model, const MotionDesign& design, bool complete) 
   return json;
 }
 
-void Print(const MotionRequest& request, const RobotModel& model, const MotionDesign& design) {
-  fmt::print(
+Report MakeReport(const MotionRequest& request, const RobotModel& model, const MotionDesign& design,
+                  bool complete) {
+  Report report{.data = ToJson(model, design, complete)};
+  report.details = fmt::format(
       "{}: a motion of {} s, {} motions tried{}\n\n", model.name(), request.options.duration,
       design.evaluations,
       request.options.calc_overlap ? "" : "; overlaps of bodies are not known without an MJCF (--mjcf)");
   std::vector<TableRow> rows = {{{"standard error over plausible size", "before", "after"}}};
   for (const ExpectedError& one : design.errors)
     rows.push_back({{one.fault, fmt::format("{:.2g}", one.before), fmt::format("{:.2g}", one.after)}});
-  fmt::print("{}\n", FormatTable("<>>", rows));
+  rows.emplace_back();
+  report.AddTable("<>>", rows);
   std::vector<TableRow> torques = {{{"joint", "largest torque"}}};
   for (int i = 0; i < model.num_joints(); ++i)
     torques.push_back({{model.joint(i).name, fmt::format("{:.3g}", design.torque[i])}});
-  fmt::print("{}\n", FormatTable("<>", torques));
+  torques.emplace_back();
+  report.AddTable("<>", torques);
+  report.last = fmt::format(
+      "{}: {} of {} combinations of sizes are known to a third of what is plausible, {} before.\n",
+      complete ? "FOUND" : "INTERRUPTED, so far", design.known_after, design.combinations,
+      design.known_before);
+  if (!complete) report.failure = "interrupted";
+  return report;
 }
 
 int Run(MotionRequest request) {
@@ -99,7 +108,8 @@ int Run(MotionRequest request) {
     request.options.calc_overlap = [&](const VectorXd& q) { return contact->CalcDepth(q); };
   }
   CatchInterrupts();
-  OutputFile json(request.json_file), motion(request.motion_file);
+  ReportOutput files(request);
+  OutputFile motion(request.motion_file);
   std::optional<RecordingSet> recorded;
   if (!recordings.empty())
     recorded.emplace(model, &recordings, ReadOptions{}, [](long) { return !IsInterrupted(); });
@@ -108,16 +118,9 @@ int Run(MotionRequest request) {
   request.options.go_on = [&](int evaluations) { return bar.GoOn(evaluations); };
   const MotionDesign design = DesignMotion(model, limits, request.options);
   bar.Finish();
-  const bool complete = !IsInterrupted();
   motion.Write([&] { return WriteMotion(model, design.motion, request.options.rate); });
-  json.Write([&] { return ToJson(model, design, complete); });
-  if (!json.is_stdout() && !motion.is_stdout()) {
-    if (!request.quiet) Print(request, model, design);
-    fmt::print("{}: {} of {} combinations of sizes are known to a third of what is plausible, {} before.\n",
-               complete ? "FOUND" : "INTERRUPTED, so far", design.known_after, design.combinations,
-               design.known_before);
-  }
-  return complete ? kSuccess : ReportFailure("interrupted");
+  return files.Write(MakeReport(request, model, design, !IsInterrupted()),
+                     /*is_printed=*/request.motion_file != "-");
 }
 
 }  // namespace

@@ -11,8 +11,7 @@
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
-#include "harness/cli/terminal.h"
+#include "harness/cli/report.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/recordings/compare_recordings.h"
 #include "harness/recordings/judgement_verdict.h"
@@ -39,13 +38,13 @@ Answer AnswerFor(const RobotModel& model, const RecordingJudgement& judgement,
                     is_one ? recordings.front().name : std::to_string(recordings.size()) + " recordings");
 }
 
-/// Prints what stands below the verdict.
-void PrintDetails(const RobotModel& model, const RecordingJudgement& judgement,
-                  const std::vector<Recording>& recordings) {
+/// Adds what stands below the verdict.
+void AddDetails(const RobotModel& model, const RecordingJudgement& judgement,
+                const std::vector<Recording>& recordings, Report* report) {
   const bool has_gains = judgement.balances.front().drive_gain != 0.0;
-  fmt::print("\n");
+  report->details = "\n";
   for (size_t recording = 0; recording < recordings.size(); ++recording) {
-    if (recordings.size() > 1) fmt::print("{}\n", recordings[recording].name);
+    if (recordings.size() > 1) report->details += recordings[recording].name + "\n";
     std::vector<TableRow> rows = {{{"torque, rms", "measured", "unexplained", "left", "noise", "held out"}}};
     if (has_gains) rows[0].cells.push_back("N m/A");
     for (const JointJudgement& one : judgement.balances) {
@@ -55,16 +54,16 @@ void PrintDetails(const RobotModel& model, const RecordingJudgement& judgement,
                    Number(one.noise),           Number(one.held_left)};
       if (has_gains) row.cells.push_back(Number(one.drive_gain));
     }
-    fmt::print("{}\n", FormatTable(has_gains ? "<>>>>>>" : "<>>>>>", rows));
+    report->AddTable(has_gains ? "<>>>>>>" : "<>>>>>", rows);
+    report->details += "\n";
   }
-  for (const std::string& note : judgement.notes) fmt::print("{}\n", Wrap(note, 2));
+  for (const std::string& note : judgement.notes) report->Add(note);
 }
 
 Json ToJson(const HeldPrediction& one) { return {{"numbers", one.numbers}, {"left", one.held_left}}; }
 
 Json ToJson(const RobotModel& model, const RecordingJudgement& judgement,
-            const std::vector<Recording>& recordings) {
-  const Answer answer = AnswerFor(model, judgement, recordings);
+            const std::vector<Recording>& recordings, const Answer& answer) {
   std::string word = answer.word;
   std::ranges::transform(word, word.begin(), [](unsigned char c) { return std::tolower(c); });
   Json json = {{"model", model.spec().source},
@@ -155,8 +154,8 @@ int Run(JudgeRequest request) {
     return kSuccess;
   }
   CatchInterrupts();
-  OutputFile json(request.json_file), corrected(request.corrected);
-  OutputFile page(RequirePageName(request.page_file));
+  ReportOutput files(request);
+  OutputFile corrected(request.corrected);
   ProgressBar bar("rows", 0, request.quiet);
   JudgeOptions options;
   options.frames = frames;
@@ -165,7 +164,7 @@ int Run(JudgeRequest request) {
     // Rows that come in as they are recorded are reported as they come.
     constexpr size_t kAhead = 1000;
     options.ahead = kAhead;
-    if (!request.quiet && !json.is_stdout())
+    if (!request.quiet && files.prints())
       options.on_second = [&model, has_head = false](double time, const std::vector<int>& joints,
                                                      const VectorXd& residual) mutable {
         if (!has_head) {
@@ -183,22 +182,23 @@ int Run(JudgeRequest request) {
   const RecordingJudgement judgement =
       JudgeRecordings(model, &recordings, options, [&](long rows) { return bar.GoOn(rows); });
   bar.Finish();
-  std::vector<std::string> written;
-  if (!IsInterrupted() && corrected.exists()) written = Correct(judgement, request, &corrected);
-  json.Write([&] { return ToJson(model, judgement, recordings); });
-  page.Write([&] {
+  Report report{.answer = AnswerFor(model, judgement, recordings)};
+  report.data = ToJson(model, judgement, recordings, report.answer);
+  report.page = [&] {
     const std::optional<ReplayData> replay = MakeMotionReplay(model, request.model, judgement);
-    return MakeJudgePage(model, judgement, ToJson(model, judgement, recordings), replay ? &*replay : nullptr);
-  });
-  if (!json.is_stdout() && !corrected.is_stdout()) {
-    Answer answer = AnswerFor(model, judgement, recordings);
-    if (IsInterrupted()) answer.remarks.emplace_back("interrupted: the later rows were not judged");
-    answer.remarks.insert(answer.remarks.end(), written.begin(), written.end());
-    PrintAnswer(answer);
-    if (!request.quiet) PrintDetails(model, judgement, recordings);
+    return MakeJudgePage(model, judgement, report.data, replay ? &*replay : nullptr);
+  };
+  AddDetails(model, judgement, recordings, &report);
+  if (IsInterrupted()) {
+    report.answer.remarks.emplace_back("interrupted: the later rows were not judged");
+    report.failure = "interrupted";
+  } else {
+    report.code = judgement.Agrees() ? kSuccess : kDisagreement;
+    if (corrected.exists())
+      for (std::string& line : Correct(judgement, request, &corrected))
+        report.answer.remarks.push_back(std::move(line));
   }
-  if (IsInterrupted()) return ReportFailure("interrupted");
-  return judgement.Agrees() ? kSuccess : kDisagreement;
+  return files.Write(report, /*is_printed=*/request.corrected != "-");
 }
 
 Json ToJson(const RobotModel& model, const RecordingPair& pair, const RecordingComparison& comparison) {
@@ -221,9 +221,10 @@ Json ToJson(const RobotModel& model, const RecordingPair& pair, const RecordingC
   return json;
 }
 
-void Print(const RobotModel& model, const RecordingPair& pair, const RecordingComparison& comparison) {
+Report MakeReport(const RobotModel& model, const RecordingPair& pair, const RecordingComparison& comparison) {
   const std::string first = pair.first.filename().string(), second = pair.second.filename().string();
-  Answer answer;
+  Report report{.data = ToJson(model, pair, comparison)};
+  Answer& answer = report.answer;
   if (comparison.causes.empty()) {
     answer.word = "SAME";
     answer.sentence = fmt::format("what {} does not explain is the same in both.", model.name());
@@ -231,20 +232,22 @@ void Print(const RobotModel& model, const RecordingPair& pair, const RecordingCo
     answer.tone = Answer::Tone::kBad;
     answer.word = "DIFFER";
     answer.sentence = fmt::format("{} and {} are of robots that differ.", first, second);
+    report.code = kDisagreement;
   }
   for (const CauseDifference& one : comparison.causes) answer.causes.push_back(one.Describe());
-  constexpr double kLeast = 1e-6;  // s
-  if (!comparison.is_same_motion)
+  if (!comparison.is_same_motion) {
     answer.remarks.emplace_back("the motions are not the same: only what explains them is compared");
-  else if (std::abs(comparison.delay) > kLeast)
+    return report;
+  }
+  constexpr double kLeast = 1e-6;  // s
+  if (std::abs(comparison.delay) > kLeast)
     answer.remarks.push_back(fmt::format("{} is {:.4g} s {} {}", second, std::abs(comparison.delay),
                                          comparison.delay > 0.0 ? "after" : "before", first));
-  PrintAnswer(answer);
-  if (pair.quiet || !comparison.is_same_motion) return;
-  std::vector<TableRow> rows = {{{"difference, rms", "position", "torque"}}};
+  std::vector<TableRow> rows = {{}, {{"difference, rms", "position", "torque"}}};
   for (const JointDifference& one : comparison.joints)
     rows.push_back({{model.joint(one.joint).name, Number(one.position), Number(one.torque)}});
-  fmt::print("\n{}", FormatTable("<>>", rows));
+  report.AddTable("<>>", rows);
+  return report;
 }
 
 }  // namespace
@@ -258,15 +261,13 @@ int CompareTwoRecordings(const RecordingPair& pair) {
   for (const std::filesystem::path& path : {pair.first, pair.second})
     recordings.push_back(OpenRecordingOf(model, path, pair.columns, /*is_complete=*/true, options.frames));
   CatchInterrupts();
-  OutputFile json(pair.json_file);
+  ReportOutput files(pair);
   ProgressBar bar("rows", 0, pair.quiet);
   const RecordingComparison comparison =
       CompareRecordings(model, &recordings, options, [&](long rows) { return bar.GoOn(rows); });
   bar.Finish();
   if (IsInterrupted()) return ReportFailure("interrupted");
-  json.Write([&] { return ToJson(model, pair, comparison); });
-  if (!json.is_stdout()) Print(model, pair, comparison);
-  return comparison.causes.empty() ? kSuccess : kDisagreement;
+  return files.Write(MakeReport(model, pair, comparison));
 }
 
 void AddJudgeCommand(CLI::App* app) {

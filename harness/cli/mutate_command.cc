@@ -12,9 +12,7 @@
 #include "harness/base/interrupts.h"
 #include "harness/cli/campaign_table.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
-#include "harness/cli/terminal.h"
 #include "harness/diagnosis/formula_mutants.h"
 #include "harness/engine/engine.h"
 #include "harness/report/page.h"
@@ -79,7 +77,7 @@ int MutateFiles(MutateRequest request) {
   RequireNoBalls(model, "when each number is changed on purpose");
   const Adapter adapter(model, *pair.engine, pair.source);
   CatchInterrupts();
-  OutputFile json(request.json_file);
+  ReportOutput output(request);
   ConsistencyOptions unchanged;
   unchanged.samples = request.options.samples;
   unchanged.seed = request.options.seed;
@@ -110,9 +108,7 @@ int MutateFiles(MutateRequest request) {
     TryMutant(pair, request.options, &mutant);
     return Describe(mutant, campaign.names_causes);
   });
-  json.Write([&] { return campaign.ToJson(); });
-  if (!json.is_stdout()) campaign.Print(request.quiet);
-  return campaign.ToExitCode();
+  return output.Write(campaign.MakeReport());
 }
 
 /// Describes what the table does not say: that a fault was not found, or that its cause or name is another.
@@ -164,9 +160,9 @@ CampaignFault Describe(const RunMutant& mutant) {
   return fault;
 }
 
-/// Prints for drawn faults, by the number of those of a set that are found alone, how many are named, and in
+/// Says of drawn faults, by the number of those of a set that are found alone, how many are named, and in
 /// how many sets each is named as well as when it is alone.
-void PrintScores(const Campaign& campaign, int together) {
+std::string DescribeScores(const Campaign& campaign, int together) {
   constexpr const char* kNames[] = {"right", "in_class", "not_explained", "wrong"};
   struct Count {
     int sets = 0, all_right = 0, as_alone = 0, of[4] = {};
@@ -182,13 +178,15 @@ void PrintScores(const Campaign& campaign, int together) {
     count.as_alone += static_cast<int>(fault.details["as_alone"].get<bool>());
     for (size_t k = 0; k < std::size(kNames); ++k) count.of[k] += of[k];
   }
+  std::string text;
   for (const auto& [size, one] : counts) {
     const std::string alone = together > 1 ? fmt::format(", each as well as alone in {}", one.as_alone) : "";
-    fmt::print(
+    text += fmt::format(
         "{} sets of {}: all named in {}{}; of their faults {} named, {} up to a class, {} not explained; {} "
         "wrong names.\n",
         one.sets, size, one.all_right, alone, one.of[0], one.of[1], one.of[2], one.of[3]);
   }
+  return text;
 }
 
 /// Makes faults in the run of a scenario.
@@ -199,7 +197,7 @@ int MutateRun(const MutateRequest& request) {
   options.duration = request.duration.value_or(options.draws > 0 ? 0.0 : options.duration);
   const ScenarioFiles files = FindScenario(request.files.robot, request.overrides.List(), /*seed=*/0);
   CatchInterrupts();
-  OutputFile json(request.json_file), page(request.page_file);
+  ReportOutput output(request);
   RunCampaign runs(files.scenario, files.robot, files.mjcf, options, IsInterrupted);
   Campaign campaign{.faults = {},
                     .total = runs.mutants().size(),
@@ -214,16 +212,14 @@ int MutateRun(const MutateRequest& request) {
                              {"together", options.together},
                              {"draw_seed", options.seed}}};
   campaign.Resume(request.json_file, {files.scenario.source, files.robot, files.mjcf});
-  campaign.Make(request.jobs, request.quiet || json.is_stdout(), [&](size_t i) {
+  campaign.Make(request.jobs, request.quiet || !output.prints(), [&](size_t i) {
     runs.Run(i, [] { return false; });
     return Describe(runs.mutants()[i]);
   });
-  json.Write([&] { return campaign.ToJson(); });
-  page.Write([&] { return MakeCampaignPage(campaign.ToJson()); });
-  if (json.is_stdout()) return campaign.ToExitCode();
-  campaign.Print(request.quiet);
-  if (options.draws > 0) PrintScores(campaign, options.together);
-  return campaign.ToExitCode();
+  Report report = campaign.MakeReport();
+  report.page = [&] { return MakeCampaignPage(report.data); };
+  if (options.draws > 0) report.last = DescribeScores(campaign, options.together);
+  return output.Write(report);
 }
 
 }  // namespace

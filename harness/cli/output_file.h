@@ -1,6 +1,6 @@
 #pragma once
 
-// Files of results, as JSON, as JUnit's XML, or of any text.
+// Files of results, as JSON or of any text.
 
 #include <cstdio>
 #include <filesystem>
@@ -8,11 +8,9 @@
 #include <optional>
 #include <string>
 #include <type_traits>
-#include <vector>
 
 #include "controller/common/types.h"
 #include "harness/base/bounded_json.h"
-#include "harness/base/check_record.h"
 #include "harness/base/files.h"
 
 namespace dexcheck::cli {
@@ -76,21 +74,5 @@ inline Json ToRows(const Eigen::Ref<const MatrixXd>& matrix) {
   for (Eigen::Index i = 0; i < matrix.rows(); ++i) rows.push_back(ToList(matrix.row(i).transpose()));
   return rows;
 }
-
-/// One check as a test case.
-struct JUnitCase {
-  std::string group;    ///< "constant", "term", "inverse_dynamics": its class.
-  std::string name;     ///< "M_bar"
-  std::string failure;  ///< What is wrong, in one or more lines; empty when nothing is.
-  std::string output;   ///< What is worth knowing anyway.
-};
-
-/// A check that has run, as a test case. @param where the worst number belongs to.
-JUnitCase MakeJUnitCase(const std::string& group, const CheckRecord& record, const std::string& where);
-
-/// The cases of one command as a JUnit XML document, which servers of continuous integration read. An error
-/// is what kept the command from its end.
-std::string WriteJUnit(const std::string& suite, const std::vector<JUnitCase>& cases, double seconds,
-                       const std::string& error = "");
 
 }  // namespace dexcheck::cli

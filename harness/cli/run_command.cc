@@ -46,11 +46,6 @@ struct RunRequest : Outputs {
   std::string command;  // as typed
 };
 
-ExitCode ToExitCode(const RunResult& result) {
-  if (result.verdict == Verdict::kFailed) return kFailure;
-  return result.verdict == Verdict::kPass ? kSuccess : kDisagreement;
-}
-
 /// The run and its verdict stand without a video or a report: why there is none is a warning.
 template <typename Make>
 void TryToMake(const char* what, const Make& make) {
@@ -110,7 +105,7 @@ int RunScenario(const RunRequest& request) {
   }
   ScenarioFiles files = FindScenario(request.scenario, overrides, request.seed);
   const std::string difference = request.no_check ? "" : JudgeFiles(&files);
-  OutputFile junit(request.junit_file);
+  ReportOutput output(request);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
   Runner runner(setup, !request.no_check, MakeParts(request, setup));
@@ -138,26 +133,20 @@ int RunScenario(const RunRequest& request) {
   if (!folder.empty()) OutputFile(folder / "summary.json").Write(text);
   if (!folder.empty() && !result.gain_card.empty())
     OutputFile(folder / "gain_card.toml").Write(result.gain_card);
-  junit.Write([&] { return WriteJUnit(setup, runner.loop(), result); });
-  const ExitCode verdict = ToExitCode(result);
+  Report report = MakeRunReport(setup, runner.loop(), result, summary, folder.string(),
+                                request.all ? Detail::kAll : Detail::kCategories);
+  if (result.attribution.cause == Cause::kModel && files.scenario.model_overrides.empty())
+    report.answer.remarks.push_back(fmt::format("why: dexcheck diagnose {} {}",
+                                                QuoteForShell(files.robot.string()),
+                                                QuoteForShell(files.mjcf.string())));
+  if (request.gains)
+    report.last =
+        "\n" + (result.gain_card.empty() ? "no margins: they are those of a joint motion under its law\n"
+                                         : result.gain_card);
+  const ExitCode verdict = result.verdict == Verdict::kFailed ? kFailure : report.code;
   std::exception_ptr unprinted;
   try {
-    OutputFile(request.json_file).Write(text);
-    if (request.json_file != "-") {
-      Answer answer = MakeRunAnswer(summary, ListChecksOf(runner.loop()));
-      if (result.attribution.cause == Cause::kModel && files.scenario.model_overrides.empty())
-        answer.remarks.push_back(fmt::format("why: dexcheck diagnose {} {}",
-                                             QuoteForShell(files.robot.string()),
-                                             QuoteForShell(files.mjcf.string())));
-      PrintAnswer(answer);
-      if (!request.quiet)
-        PrintRunReport(setup, runner.loop(), result, folder.string(),
-                       request.all ? Detail::kAll : Detail::kCategories);
-      if (request.gains)
-        fmt::print("\n{}", result.gain_card.empty()
-                               ? "no margins: they are those of a joint motion under its law\n"
-                               : result.gain_card);
-    }
+    output.Write(report);
     FlushOutput();
   } catch (const std::exception&) {
     unprinted = std::current_exception();  // standard output takes nothing: reported when all is done
@@ -170,7 +159,7 @@ int RunScenario(const RunRequest& request) {
     }
   }
   if (unprinted) std::rethrow_exception(unprinted);
-  return verdict == kFailure ? ReportFailure(result.failure) : verdict;
+  return verdict;
 }
 
 /// A line on standard error when the run's own controller is another file now.

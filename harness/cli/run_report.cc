@@ -10,10 +10,11 @@
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
 #include "harness/checks/check_table.h"
-#include "harness/cli/output_file.h"
-#include "harness/cli/terminal.h"
 
 namespace dexcheck::cli {
+namespace {
+
+/// Returns the checks of the model and of the motion that the run has; none of a run that was not checked.
 std::vector<CheckRecord> ListChecksOf(const ClosedLoop& loop) {
   std::vector<CheckRecord> all;
   if (!loop.is_checking()) return all;
@@ -22,8 +23,6 @@ std::vector<CheckRecord> ListChecksOf(const ClosedLoop& loop) {
     std::ranges::copy_if(records, std::back_inserter(all), &CheckRecord::applies);
   return all;
 }
-
-namespace {
 
 std::string PaintStatus(const CheckRecord& check) {
   const std::string status = DescribeStatus(check);
@@ -70,7 +69,7 @@ void AddCategory(CheckCategory kind, const ClosedLoop& loop, std::vector<TableRo
     rows->push_back({{NameOf(kind), std::to_string(passing.not_reached), "not reached"}});
 }
 
-void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
+void AddChecks(const Setup& setup, const ClosedLoop& loop, Detail detail, Report* report) {
   const bool all = detail == Detail::kAll;
   std::vector<TableRow> rows = {
       {{"category", "", all ? "check" : "checks, nearest to its bound", "worst", "bound"}}};
@@ -87,8 +86,9 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
   if (all) {  // each line is one check
     for (TableRow& row : rows) row.cells.erase(row.cells.begin() + 1);
   }
-  fmt::print("\n{}", FormatTable(all ? "<<>><<" : "<><>><<", rows));
-  if (!all) fmt::print("(--all lists each check)\n");
+  report->details += "\n";
+  report->AddTable(all ? "<<>><<" : "<><>><<", rows);
+  if (!all) report->Add("(--all lists each check)");
   std::vector<std::string> names;
   double from = 0.0;
   for (const CheckRecord& check : loop.checks().settling_failures()) {
@@ -96,35 +96,35 @@ void PrintChecks(const Setup& setup, const ClosedLoop& loop, Detail detail) {
     from = std::min(from, check.failed_at);
   }
   if (!names.empty())
-    fmt::print("{}\n",
-               Wrap(fmt::format("fails while settling, from {:.3f} s: {}", from, JoinNames(names)), 2));
+    report->Add(fmt::format("fails while settling, from {:.3f} s: {}", from, JoinNames(names)));
 }
 
 /// "approach 0.0, close 3.4, ..." with the time each began.
-void PrintTask(const ClosedLoop& loop) {
+void AddTask(const ClosedLoop& loop, Report* report) {
   const PickAndPlace& task = loop.task()->task();
   std::string line;
   for (const PhaseEntry& entry : task.history()) {
     line += fmt::format("{}{} {:.1f}", line.empty() ? "" : ", ", NameOf(entry.phase), entry.time);
   }
-  fmt::print("{}\n", Wrap("phases, s: " + line, 2));
-  if (!task.first_failure().empty()) fmt::print("first attempt: {}\n", task.first_failure());
-  if (task.scale() != 1.0) fmt::print("weighed: {:.3f} of the stated mass\n", task.scale());
-  fmt::print("object pushed by {:.1e} m before it was held; largest step of a torque {:.1e} N m\n",
-             task.push(), loop.task()->torque_jump());
+  report->Add("phases, s: " + line);
+  if (!task.first_failure().empty()) report->Add(fmt::format("first attempt: {}", task.first_failure()));
+  if (task.scale() != 1.0) report->Add(fmt::format("weighed: {:.3f} of the stated mass", task.scale()));
+  report->Add(fmt::format("object pushed by {:.1e} m before it was held; largest step of a torque {:.1e} N m",
+                          task.push(), loop.task()->torque_jump()));
 }
 
-void PrintTracking(const Scenario& scenario, const TrackingStatistics& tracking) {
+void AddTracking(const Scenario& scenario, const TrackingStatistics& tracking, Report* report) {
   if (scenario.joint_task() != nullptr) {
-    fmt::print("joints: largest error {:.2e} rad (rms {:.2e})\n", tracking.joints.max, tracking.joints.rms());
+    report->Add(fmt::format("joints: largest error {:.2e} rad (rms {:.2e})", tracking.joints.max,
+                            tracking.joints.rms()));
     return;
   }
-  fmt::print("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad\n",
-             tracking.position.max, tracking.position.rms(), tracking.orientation.max);
+  report->Add(fmt::format("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad",
+                          tracking.position.max, tracking.position.rms(), tracking.orientation.max));
 }
 
 /// At which motors torques were cut off, and how long; the longest first.
-void PrintLimits(std::span<const Motor> motors, const std::vector<LimitedTorque>& limited) {
+void AddLimits(std::span<const Motor> motors, const std::vector<LimitedTorque>& limited, Report* report) {
   std::vector<size_t> order;
   for (size_t i = 0; i < limited.size(); ++i)
     if (limited[i].time > 0.0) order.push_back(i);
@@ -133,84 +133,93 @@ void PrintLimits(std::span<const Motor> motors, const std::vector<LimitedTorque>
   for (const size_t i : order)
     text += fmt::format("{}{} for {:.3f} s from {:.3f} s, by up to {:.3g}", i == order.front() ? "" : "; ",
                         motors[i].name, limited[i].time, limited[i].first, limited[i].most);
-  fmt::print("{}\n", Wrap(order.empty() ? text + "at no joint" : text, 2));
+  report->Add(order.empty() ? text + "at no joint" : text);
 }
 
 /// Which bodies came nearest to each other that must not touch.
-void PrintClearance(const Clearance& clearance) {
+void AddClearance(const Clearance& clearance, Report* report) {
   const Clearance::Nearest* nearest = nullptr;
   for (int i = 0; i < kPairClassCount; ++i) {
     const Clearance::Nearest& one = clearance.nearest(static_cast<PairClass>(i));
     if (one.pair >= 0 && (nearest == nullptr || one.distance < nearest->distance)) nearest = &one;
   }
   if (nearest == nullptr) return;
-  fmt::print("smallest clearance: {}, {:.1f} mm {} at t = {:.3f} s\n", clearance.Describe(nearest->pair),
-             1e3 * std::abs(nearest->distance), nearest->distance < 0.0 ? "into each other" : "apart",
-             nearest->time);
+  report->Add(fmt::format("smallest clearance: {}, {:.1f} mm {} at t = {:.3f} s",
+                          clearance.Describe(nearest->pair), 1e3 * std::abs(nearest->distance),
+                          nearest->distance < 0.0 ? "into each other" : "apart", nearest->time));
 }
 
 /// How far the paper's rigid contacts are from the plant's.
-void PrintRigidContacts(const RunChecks& checks) {
+void AddRigidContacts(const RunChecks& checks, Report* report) {
   if (!checks.Has("reduced_acceleration") || !checks.Has("contact_force")) return;
   const CheckRecord& acceleration = checks.Find("reduced_acceleration");
   if (acceleration.count == 0) return;
-  fmt::print("rigid contacts explain accelerations to {:.1e}, contact forces to {:.1e}\n", acceleration.worst,
-             checks.Find("contact_force").worst);
+  report->Add(fmt::format("rigid contacts explain accelerations to {:.1e}, contact forces to {:.1e}",
+                          acceleration.worst, checks.Find("contact_force").worst));
 }
 
-void PrintSpeed(const ClosedLoop& loop, const RunResult& result) {
+void AddSpeed(const ClosedLoop& loop, const RunResult& result, Report* report) {
   const LoopTimes& times = loop.times();
   const double scale = 1e6 / static_cast<double>(std::max(loop.record().step, 1L));
-  fmt::print(
+  report->Add(fmt::format(
       "\n{:.1f} x real time; us/step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, recording "
-      "{:.0f}\n",
+      "{:.0f}",
       result.wall_seconds > 0.0 ? loop.time() / result.wall_seconds : 0.0, scale * times.plant,
-      scale * times.controller, scale * times.cross_check, scale * result.recording_seconds);
+      scale * times.controller, scale * times.cross_check, scale * result.recording_seconds));
+}
+
+/// Adds what stands below the verdict.
+void AddDetails(const Setup& setup, const ClosedLoop& loop, const RunResult& result, Detail detail,
+                Report* report) {
+  const Scenario& scenario = setup.scenario();
+  report->Add("\n" + scenario.name + ": " + scenario.description);
+  report->Add(fmt::format("{:.3f} of {:.3f} s simulated, {} steps of {} ms", loop.time(), scenario.duration,
+                          loop.record().step, 1e3 * scenario.plant.time_step));
+  if (scenario.tolerance > 0.0)
+    report->Add(fmt::format("judged to a relative tolerance of {:g}", scenario.tolerance));
+  for (const std::string& key : scenario.imperfections.declared)
+    report->Add(fmt::format("declared: {}", key));
+  if (loop.record().step > 0) AddTracking(scenario, result.tracking, report);
+  if (scenario.control.kappa == ContactSource::kIntegrated) {
+    const ContactDrift& drift = loop.largest_drift();
+    report->Add(
+        fmt::format("contacts followed by (40): off by {:.2e} m on the object, {:.2e} m on the fingertip, "
+                    "{:.2e} rad in psi",
+                    drift.object, drift.fingertip, drift.psi));
+  }
+  if (scenario.imperfections.actuation.saturates()) AddLimits(loop.motors(), result.limited, report);
+  if (loop.task() != nullptr) AddTask(loop, report);
+  if (loop.is_checking()) {
+    AddClearance(loop.checks().clearance(), report);
+    AddRigidContacts(loop.checks(), report);
+    AddChecks(setup, loop, detail, report);
+  }
+  AddSpeed(loop, result, report);
 }
 
 }  // namespace
 
-void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result,
-                    const std::string& folder, Detail detail) {
-  const Scenario& scenario = setup.scenario();
-  fmt::print("\n{}\n", Wrap(scenario.name + ": " + scenario.description, 2));
-  fmt::print("{:.3f} of {:.3f} s simulated, {} steps of {} ms\n", loop.time(), scenario.duration,
-             loop.record().step, 1e3 * scenario.plant.time_step);
-  if (scenario.tolerance > 0.0) fmt::print("judged to a relative tolerance of {:g}\n", scenario.tolerance);
-  for (const std::string& key : scenario.imperfections.declared) fmt::print("declared: {}\n", key);
-  if (loop.record().step > 0) PrintTracking(scenario, result.tracking);
-  if (scenario.control.kappa == ContactSource::kIntegrated) {
-    const ContactDrift& drift = loop.largest_drift();
-    fmt::print(
-        "contacts followed by (40): off by {:.2e} m on the object, {:.2e} m on the fingertip, "
-        "{:.2e} rad in psi\n",
-        drift.object, drift.fingertip, drift.psi);
-  }
-  if (scenario.imperfections.actuation.saturates()) PrintLimits(loop.motors(), result.limited);
-  if (loop.task() != nullptr) PrintTask(loop);
+Report MakeRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result, const Json& summary,
+                     const std::string& folder, Detail detail) {
+  const std::vector<CheckRecord> checks = ListChecksOf(loop);
+  Report report{.answer = MakeRunAnswer(summary, checks),
+                .data = summary,
+                .suite = "run." + setup.scenario().name,
+                .seconds = result.wall_seconds,
+                .failure = result.failure};
+  AddDetails(setup, loop, result, detail, &report);
+  if (!folder.empty()) report.Add("log and summary in " + folder);
   if (loop.is_checking()) {
-    PrintClearance(loop.checks().clearance());
-    PrintRigidContacts(loop.checks());
-    PrintChecks(setup, loop, detail);
+    for (const CheckRecord& check : setup.constants().records) report.AddCase("constant", check, "");
+    for (const CheckRecord& check : checks) report.AddCase(NameOf(check.kind), check, check.part);
   }
-  PrintSpeed(loop, result);
-  if (!folder.empty()) fmt::print("log and summary in {}\n", folder);
-}
-
-std::string WriteJUnit(const Setup& setup, const ClosedLoop& loop, const RunResult& result) {
-  std::vector<JUnitCase> cases;
-  if (loop.is_checking()) {
-    for (const CheckRecord& check : setup.constants().records) {
-      cases.push_back(MakeJUnitCase("constant", check, ""));
-    }
-    for (const CheckRecord& check : ListChecksOf(loop))
-      cases.push_back(MakeJUnitCase(NameOf(check.kind), check, check.part));
+  JUnitCase& verdict = report.cases.emplace_back(JUnitCase{"run", "verdict"});
+  if (result.verdict == Verdict::kDisagreement) {
+    report.code = kDisagreement;
+    verdict.failure =
+        fmt::format("cause: {} ({})", NameOf(result.attribution.cause), result.attribution.evidence);
   }
-  const bool disagrees = result.verdict == Verdict::kDisagreement;
-  const std::string cause =
-      fmt::format("cause: {} ({})", NameOf(result.attribution.cause), result.attribution.evidence);
-  cases.push_back({"run", "verdict", disagrees ? cause : "", ""});
-  return WriteJUnit("dexcheck.run." + setup.scenario().name, cases, result.wall_seconds, result.failure);
+  return report;
 }
 
 }  // namespace dexcheck::cli

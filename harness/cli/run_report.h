@@ -1,8 +1,8 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
+#include "harness/cli/report.h"
 #include "harness/run/run_summary.h"
 
 namespace dexcheck::cli {
@@ -13,15 +13,9 @@ enum class Detail {
   kAll,         ///< Each check.
 };
 
-/// Returns the checks of the model and of the motion that the run has; none of a run that was not checked.
-std::vector<CheckRecord> ListChecksOf(const ClosedLoop& loop);
-
-/// Prints what stands below a run's verdict: tracking, checks, speed, where the files are.
-/// @param folder empty when nothing was written.
-void PrintRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result,
-                    const std::string& folder, Detail detail);
-
-/// Its checks as a JUnit document; an unfinished run is an error.
-std::string WriteJUnit(const Setup& setup, const ClosedLoop& loop, const RunResult& result);
+/// Returns a run's verdict, and below it tracking, checks, speed, and where the files are.
+/// @param summary of the run. @param folder empty when nothing was written.
+Report MakeRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result, const Json& summary,
+                     const std::string& folder, Detail detail);
 
 }  // namespace dexcheck::cli

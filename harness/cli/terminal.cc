@@ -63,36 +63,6 @@ std::string Wrap(std::string_view text, size_t indent) {
   }
 }
 
-void PrintAnswer(const Answer& answer) {
-  constexpr size_t kMostShown = 30;
-  const std::string line = Wrap(answer.word + ": " + answer.sentence, 2);
-  fmt::print("{}{}\n", Paint(answer.tone, answer.word), line.substr(answer.word.size()));
-  for (size_t i = 0; i < std::min(answer.causes.size(), kMostShown); ++i)
-    fmt::print("{}\n", Wrap(fmt::format("  {}. {}", i + 1, answer.causes[i]), 5));
-  if (answer.causes.size() > kMostShown)
-    fmt::print("  and {} more (--json)\n", answer.causes.size() - kMostShown);
-  for (const std::string& remark : answer.remarks) fmt::print("{}\n", Wrap("  " + remark, 5));
-}
-
-std::string FormatTable(std::string_view align, const std::vector<TableRow>& rows) {
-  std::vector<size_t> widths(align.size(), 0);
-  for (const TableRow& row : rows) {
-    for (size_t i = 0; i < row.cells.size(); ++i) widths[i] = std::max(widths[i], row.cells[i].size());
-  }
-  std::string table;
-  for (const TableRow& row : rows) {
-    std::string line;
-    for (size_t i = 0; i < row.cells.size(); ++i) {
-      const std::string gap(widths[i] - row.cells[i].size(), ' ');
-      line += (i == 0 ? "" : "  ") + (align[i] == '<' ? row.cells[i] + gap : gap + row.cells[i]);
-    }
-    line.erase(line.find_last_not_of(' ') + 1);
-    if (!row.cells.empty() || row.note.empty()) table += line + "\n";
-    if (!row.note.empty()) table += Wrap(row.note, 6) + "\n";
-  }
-  return table;
-}
-
 std::string Paint(Tone tone, std::string_view text) {
   if (!TakesColors()) return std::string(text);
   const char* const code = tone == Tone::kGood ? "32" : tone == Tone::kBad ? "1;31" : "2";

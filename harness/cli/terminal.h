@@ -6,7 +6,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "harness/base/answer.h"
 
@@ -22,23 +21,11 @@ inline constexpr size_t kColumns = 80;
 /// longer stays whole.
 std::string Wrap(std::string_view text, size_t indent);
 
-/// A line of a table.
-struct TableRow {
-  std::vector<std::string> cells;  ///< None for an empty line.
-  std::string note = {};           ///< What is said below it, wrapped.
-};
-/// Columns as wide as their widest cells, two blanks apart. @param align of each column: '<' to the left, '>'
-/// to the right.
-std::string FormatTable(std::string_view align, const std::vector<TableRow>& rows);
-
 using Tone = Answer::Tone;
 
 /// The text in a colour when standard output is a terminal and the environment has no NO_COLOR (no-color.org)
 /// and no TERM=dumb; otherwise as it is.
 std::string Paint(Tone tone, std::string_view text);
-
-/// Prints a verdict, its causes with their numbers, and its remarks, wrapped.
-void PrintAnswer(const Answer& answer);
 
 /// A line on standard error that shows how far long work has come, never wider than the terminal; silent when
 /// standard error is no terminal.

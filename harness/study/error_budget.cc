@@ -3,18 +3,158 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
+#include <span>
 #include <type_traits>
 #include <utility>
 
 #include "controller/common/errors.h"
+#include "controller/control/actuation.h"
+#include "controller/control/constrained_dynamics.h"
+#include "controller/control/controller.h"
+#include "controller/control/grasp_model.h"
+#include "controller/control/trajectory.h"
 #include "harness/base/byte_archive.h"
 #include "harness/base/process_pool.h"
+#include "harness/checks/step_record.h"
+#include "harness/plant/disturbances.h"
+#include "harness/plant/motor_drive.h"
+#include "harness/plant/sensing.h"
 #include "harness/run/loop_parts.h"
 #include "harness/run/runner.h"
+#include "harness/scenario/setup.h"
 
 namespace dexcheck {
 
 namespace {
+
+/// Errors by step: of the object's position (3), m, or of joints (n), rad or m.
+struct Errors {
+  std::vector<double> values;  ///< One step behind the other.
+  size_t size = 3;             ///< Numbers of a step.
+  void Append(const VectorXd& error) {
+    size = static_cast<size_t>(error.size());
+    values.insert(values.end(), error.begin(), error.end());
+  }
+  [[nodiscard]] size_t CountSteps() const { return values.size() / size; }
+  [[nodiscard]] Eigen::Map<const VectorXd> At(size_t step) const {
+    return {values.data() + step * size, static_cast<Eigen::Index>(size)};
+  }
+};
+
+/// Predicts to first order what a plant that is not ideal makes of the tracking error: along the run of an
+/// ideal one it computes at each step what would be measured, what the law would send then, what the motors
+/// would deliver, and how the rigid system (19), (46), (48) with the plant's own masses and pushes would
+/// accelerate. That acceleration less the ideal one, d, drives the error. Of the object's position, with the
+/// gains of (57),
+///
+///   e_ddot + K_v e_dot + K_p e = -d,   e = X_d - X_o
+///
+/// and in the same way of the joints that follow a motion of their own, e = q_d - q, by computed torque. The
+/// other laws of joints leave e_ddot = -d - M^-1 (K e + D e_dot).
+class ErrorPrediction {
+ public:
+  /// @param setup of the scenario with its imperfections; outlives this.
+  /// @param acts_at_rest whether the run begins with the error that the first d has in the end.
+  ErrorPrediction(const Setup& setup, bool acts_at_rest)
+      : sensing_(setup.scenario().imperfections.sensing, setup.MakePartContext()),
+        drive_(MakeLoopParts(setup).plant->motors(), setup.scenario().imperfections.actuation,
+               setup.MakePartContext()),
+        disturbances_(setup.scenario().imperfections.disturbances, setup.MakePartContext()),
+        controller_(MakeScenarioLaw(setup)),
+        model_(setup.declared_model(), setup.fingertips(), setup.declared_object().body, setup.surface(),
+               setup.MakeModelOptions()),
+        dynamics_(setup.declared_model(), static_cast<int>(setup.fingertips().size())),
+        actuation_(setup.model()),
+        joint_motion_(setup.joints() == nullptr ? nullptr : &setup.joints()->motion),
+        time_step_(setup.scenario().plant.time_step),
+        acts_at_rest_(acts_at_rest) {
+    force_.setZero(setup.model().num_velocities());
+    command_.tau = force_;
+    if (joint_motion_ == nullptr) {
+      trajectory_ = setup.MakeTrajectory();
+      controller_->Follow(*trajectory_);
+      K_p_ = setup.scenario().control.gains.K_p.head<3>();
+      K_v_ = setup.scenario().control.gains.K_v.head<3>();
+    } else {
+      const JointGains& gains = setup.joints()->gains;
+      is_decoupled_ = setup.scenario().control.law == ControlLaw::kComputedTorque;
+      K_p_ = is_decoupled_ ? gains.K_p : gains.K;
+      K_v_ = is_decoupled_ ? gains.K_v : gains.D;
+    }
+    e_.setZero(K_p_.size());
+    e_dot_ = e_ddot_ = acceleration_ = e_;
+  }
+
+  /// Acceleration at a step of the ideal run: of the object's origin, world (3), m/s^2, or of the joints (n).
+  /// Once at each step.
+  const VectorXd& CalcAcceleration(const StepRecord& ideal) {
+    const MeasuredState& true_state = ideal.reading.state;
+    sensing_.Measure(ideal.reading, &measured_);
+    if (!has_begun_ && joint_motion_ != nullptr) controller_->Begin(ideal.time, measured_);
+    has_begun_ = true;
+    controller_->Step(measured_, ideal.time, &command_);
+    drive_.Drive(command_.tau, true_state.xi, &tau_);
+    actuation_.CalcForce(tau_, force_);
+    const std::span<const Wrench> wrenches = disturbances_.Evaluate(ideal.time, true_state);
+    model_.SetState(true_state);
+    AddRobotForce(wrenches, model_.robot(), force_);
+    if (joint_motion_ != nullptr) {
+      acceleration_ = dynamics_.PredictFree(model_.robot(), force_).xi_dot;
+      return acceleration_;
+    }
+    const Vector6d push = CalcObjectWrench(wrenches, true_state.X_Bo);
+    const Vector6d& V_Bo_dot =
+        dynamics_.Predict(model_.robot(), model_.grasp(), force_, ObjectSupport::kHand, nullptr, &push)
+            .V_Bo_dot;
+    // p_ddot = R (v_dot + omega x v)
+    const Vector3d v = true_state.V_Bo.head<3>(), omega = true_state.V_Bo.tail<3>();
+    acceleration_ = true_state.X_Bo.linear() * (V_Bo_dot.head<3>() + omega.cross(v));
+    return acceleration_;
+  }
+
+  /// One step of the error. @param d as CalcAcceleration.
+  void Step(const VectorXd& d) {
+    const MatrixXd& M = model_.robot().M();
+    if (errors_.values.empty() && acts_at_rest_) {
+      const VectorXd at_rest = is_decoupled_ ? d : VectorXd(M * d);
+      e_ = (K_p_ > 0.0).select(-at_rest.array() / K_p_, 0.0);
+    }
+    errors_.Append(e_);
+    e_ddot_ = -(K_v_ * e_dot_.array() + K_p_ * e_.array());
+    if (!is_decoupled_) {
+      // Springs and dampers add to the forces, M^-1 (force + bias - bias).
+      force_ = e_ddot_ + dynamics_.bias();
+      e_ddot_ = dynamics_.PredictFree(model_.robot(), force_).xi_dot;
+    }
+    e_dot_ += time_step_ * (e_ddot_ - d);
+    e_ += time_step_ * e_dot_;
+  }
+
+  /// The error at each step, less that of the ideal run.
+  [[nodiscard]] const Errors& errors() const { return errors_; }
+
+ private:
+  Sensing sensing_;
+  MotorDrive drive_;
+  Disturbances disturbances_;
+  std::unique_ptr<Trajectory> trajectory_;
+  std::unique_ptr<Controller> controller_;
+  GraspModel model_;
+  ConstrainedDynamics dynamics_;
+  ActuationMap actuation_;
+  const JointMotion* joint_motion_;  // null of an object
+  bool is_decoupled_ = true;         // the error's dynamics have gains of their own
+  Reading measured_;
+  Command command_;
+  VectorXd tau_, force_;      // n
+  Eigen::ArrayXd K_p_, K_v_;  // or K, D
+  double time_step_;
+  bool acts_at_rest_;
+  bool has_begun_ = false;
+  VectorXd acceleration_, e_, e_dot_, e_ddot_;
+  Errors errors_;
+};
 
 constexpr ErrorSize kNoPrediction{std::numeric_limits<double>::quiet_NaN(),
                                   std::numeric_limits<double>::quiet_NaN()};
@@ -261,78 +401,6 @@ ErrorBudget CalcErrorBudget(const Scenario& scenario, const std::filesystem::pat
   budget.sum = size_of(sum);
   budget.predicted = knows_law ? size_of(predicted) : kNoPrediction;
   return budget;
-}
-
-ErrorPrediction::ErrorPrediction(const Setup& setup, bool acts_at_rest)
-    : sensing_(setup.scenario().imperfections.sensing, setup.MakePartContext()),
-      drive_(MakeLoopParts(setup).plant->motors(), setup.scenario().imperfections.actuation,
-             setup.MakePartContext()),
-      disturbances_(setup.scenario().imperfections.disturbances, setup.MakePartContext()),
-      controller_(MakeScenarioLaw(setup)),
-      model_(setup.declared_model(), setup.fingertips(), setup.declared_object().body, setup.surface(),
-             setup.MakeModelOptions()),
-      dynamics_(setup.declared_model(), static_cast<int>(setup.fingertips().size())),
-      actuation_(setup.model()),
-      joint_motion_(setup.joints() == nullptr ? nullptr : &setup.joints()->motion),
-      time_step_(setup.scenario().plant.time_step),
-      acts_at_rest_(acts_at_rest) {
-  force_.setZero(setup.model().num_velocities());
-  command_.tau = force_;
-  if (joint_motion_ == nullptr) {
-    trajectory_ = setup.MakeTrajectory();
-    controller_->Follow(*trajectory_);
-    K_p_ = setup.scenario().control.gains.K_p.head<3>();
-    K_v_ = setup.scenario().control.gains.K_v.head<3>();
-  } else {
-    const JointGains& gains = setup.joints()->gains;
-    is_decoupled_ = setup.scenario().control.law == ControlLaw::kComputedTorque;
-    K_p_ = is_decoupled_ ? gains.K_p : gains.K;
-    K_v_ = is_decoupled_ ? gains.K_v : gains.D;
-  }
-  e_.setZero(K_p_.size());
-  e_dot_ = e_ddot_ = acceleration_ = e_;
-}
-
-const VectorXd& ErrorPrediction::CalcAcceleration(const StepRecord& ideal) {
-  const MeasuredState& true_state = ideal.reading.state;
-  sensing_.Measure(ideal.reading, &measured_);
-  if (!has_begun_ && joint_motion_ != nullptr) controller_->Begin(ideal.time, measured_);
-  has_begun_ = true;
-  controller_->Step(measured_, ideal.time, &command_);
-  drive_.Drive(command_.tau, true_state.xi, &tau_);
-  actuation_.CalcForce(tau_, force_);
-  const std::span<const Wrench> wrenches = disturbances_.Evaluate(ideal.time, true_state);
-  model_.SetState(true_state);
-  AddRobotForce(wrenches, model_.robot(), force_);
-  if (joint_motion_ != nullptr) {
-    acceleration_ = dynamics_.PredictFree(model_.robot(), force_).xi_dot;
-    return acceleration_;
-  }
-  const Vector6d push = CalcObjectWrench(wrenches, true_state.X_Bo);
-  const Vector6d& V_Bo_dot =
-      dynamics_.Predict(model_.robot(), model_.grasp(), force_, ObjectSupport::kHand, nullptr, &push)
-          .V_Bo_dot;
-  // p_ddot = R (v_dot + omega x v)
-  const Vector3d v = true_state.V_Bo.head<3>(), omega = true_state.V_Bo.tail<3>();
-  acceleration_ = true_state.X_Bo.linear() * (V_Bo_dot.head<3>() + omega.cross(v));
-  return acceleration_;
-}
-
-void ErrorPrediction::Step(const VectorXd& d) {
-  const MatrixXd& M = model_.robot().M();
-  if (errors_.values.empty() && acts_at_rest_) {
-    const VectorXd at_rest = is_decoupled_ ? d : VectorXd(M * d);
-    e_ = (K_p_ > 0.0).select(-at_rest.array() / K_p_, 0.0);
-  }
-  errors_.Append(e_);
-  e_ddot_ = -(K_v_ * e_dot_.array() + K_p_ * e_.array());
-  if (!is_decoupled_) {
-    // Springs and dampers add to the forces, M^-1 (force + bias - bias).
-    force_ = e_ddot_ + dynamics_.bias();
-    e_ddot_ = dynamics_.PredictFree(model_.robot(), force_).xi_dot;
-  }
-  e_dot_ += time_step_ * (e_ddot_ - d);
-  e_ += time_step_ * e_dot_;
 }
 
 }  // namespace dexcheck
