@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
+#include <optional>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
@@ -80,12 +82,10 @@ std::vector<LegendEntry> MakeForceLegend(const RunFrames& run) {
   return legend;
 }
 
-}  // namespace
-
 /// Draws one run.
-class VideoPainter::RunPainter {
+class Painter {
  public:
-  RunPainter(const RunView& view, const VideoOptions& options)
+  Painter(const RunView& view, const VideoOptions& options)
       : model_((CheckRunFrames(*view.model, *view.frames), *view.model)),
         run_(*view.frames),
         options_(options),
@@ -235,12 +235,11 @@ class VideoPainter::RunPainter {
   std::optional<Overlay> overlay_;
 };
 
-VideoPainter::VideoPainter(const RunView& run, const VideoOptions& options)
-    : painter_(std::make_unique<RunPainter>(run, options)) {}
+}  // namespace
 
-VideoPainter::~VideoPainter() = default;
-
-Image VideoPainter::Paint(double time) { return painter_->Paint(time); }
+RunPainter MakePainter(const RunView& run, const VideoOptions& options) {
+  return [painter = std::make_shared<Painter>(run, options)](double time) { return painter->Paint(time); };
+}
 
 long CountFrames(const RunView& run, int fps) {
   CheckRunFrames(*run.model, *run.frames);
@@ -254,10 +253,10 @@ bool RenderVideo(const RunView& run, const VideoOptions& options, VideoWriter* v
                  const std::function<bool(long done, long total)>& progress) {
   Require(options.workers >= 1, "workers", "must be positive", options.workers);
   const long frames = CountFrames(run, options.fps);
-  std::unique_ptr<VideoPainter> painter;  // made in each of the processes
+  RunPainter painter;  // made in each of the processes
   const auto paint = [&](size_t frame) {
-    if (!painter) painter = std::make_unique<VideoPainter>(run, options);
-    const Image image = painter->Paint(static_cast<double>(frame) / options.fps);
+    if (!painter) painter = MakePainter(run, options);
+    const Image image = painter(static_cast<double>(frame) / options.fps);
     return std::string(image.rgb.begin(), image.rgb.end());
   };
   bool goes_on = true;

@@ -5,7 +5,6 @@
 #include <mujoco/mujoco.h>
 
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -20,10 +19,7 @@ namespace dexcheck {
 inline constexpr const char* kRobotCamera = "robot";
 inline constexpr const char* kObjectCamera = "object";
 
-struct VideoOptions {
-  int width = 1280;
-  int height = 720;
-  int fps = 30;
+struct VideoOptions : EncodingOptions {
   /// One of the model's, kCourseCamera, kRobotCamera or kObjectCamera; empty for "overview", or where the
   /// model has none for the course's.
   std::string camera;
@@ -41,22 +37,13 @@ struct RunView {
   const RunFrames* frames;
 };
 
-/// Draws the instants of one run. For the thread that made it.
-class VideoPainter {
- public:
-  /// @throws InputError for an unknown camera or frames that CheckRunFrames refuses.
-  VideoPainter(const RunView& run, const VideoOptions& options);
-  ~VideoPainter();
-  VideoPainter(const VideoPainter&) = delete;
-  VideoPainter& operator=(const VideoPainter&) = delete;
+/// Draws the instants of a run: the picture `time` seconds after its beginning; after its end the run stands
+/// still.
+using RunPainter = std::function<Image(double time)>;
 
-  /// The picture `time` seconds after the run's beginning; after its end the run stands still.
-  Image Paint(double time);
-
- private:
-  class RunPainter;
-  std::unique_ptr<RunPainter> painter_;
-};
+/// Makes a painter for this thread. @throws InputError for an unknown camera or frames that CheckRunFrames
+/// refuses.
+RunPainter MakePainter(const RunView& run, const VideoOptions& options);
 
 /// How many frames show a run: its duration times the frame rate, rounded, at least one.
 long CountFrames(const RunView& run, int fps);

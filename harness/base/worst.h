@@ -3,6 +3,8 @@
 // Largest values that do not lose what is not a number, as std::max and Eigen's maxCoeff do by position.
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 
 namespace dexcheck {
 
@@ -27,6 +29,16 @@ template <typename T, typename... More>
 template <typename Derived>
 [[nodiscard]] double Largest(const Eigen::DenseBase<Derived>& values) {
   return values.size() > 0 ? values.template maxCoeff<Eigen::PropagateNaN>() : 0.0;
+}
+
+/// The largest magnitude of the finite entries; 0 where there is none.
+template <typename Derived>
+[[nodiscard]] double MaxAbsFinite(const Eigen::DenseBase<Derived>& values) {
+  double largest = 0.0;
+  for (const double value : values.reshaped()) {
+    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+  }
+  return largest;
 }
 
 /// The largest magnitude of an entry; NaN when one is.

@@ -73,7 +73,7 @@ RepairTrial TryRepair(const ConsistencyRequest& request, const Comparison& compa
 /// Returns whether the two agree, and if not, why.
 Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& comparison, const RepairTrial& repair);
 
-/// Returns what was compared and how it agrees. @param repair that the answer tells of.
+/// Returns what was compared and how it agrees. @param repair that the answer names.
 Report MakeReport(const ConsistencyRequest& request, const Comparison& comparison, const RepairTrial& repair);
 
 /// Adds "causes" and "unexplained", which is all that differs where terms alone are compared.

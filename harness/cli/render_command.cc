@@ -49,12 +49,8 @@ void ReadSize(const std::string& text, int* width, int* height) {
 bool WriteVideo(const RunView& run, VideoOptions options, const std::string& out, bool quiet) {
   options.workers = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8);
   const auto start = std::chrono::steady_clock::now();
-  EncodingOptions encoding;
-  encoding.width = options.width;
-  encoding.height = options.height;
-  encoding.fps = options.fps;
   const long frames = CountFrames(run, options.fps);
-  VideoWriter video(out, encoding);
+  VideoWriter video(out, options);
   CatchInterrupts();
   ProgressBar bar("drawing", frames, quiet);
   const bool complete = RenderVideo(run, options, &video, [&](long done, long) { return bar.GoOn(done); });
@@ -103,7 +99,7 @@ void WriteStill(const RenderRequest& request, const RunView& run, const std::str
     throw InputError("--still: must be from 0 to " + FormatNumber(run.frames->duration()) + " s, got " +
                      FormatNumber(*request.still));
   }
-  WritePng(out, VideoPainter(run, request.video).Paint(*request.still));
+  WritePng(out, MakePainter(run, request.video)(*request.still));
   if (!request.quiet) {
     fmt::print("{}: {:.2f} s of the run, {} x {}\n", out, *request.still, request.video.width,
                request.video.height);

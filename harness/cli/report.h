@@ -1,6 +1,6 @@
 #pragma once
 
-// What a command found: one value, which is rendered as text, as JSON, as JUnit's XML and as a page.
+// The result of a command: one value, which is rendered as text, as JSON, as JUnit's XML and as a page.
 
 #include <functional>
 #include <string>
@@ -29,7 +29,7 @@ struct JUnitCase {
   std::string output = {};   ///< What is worth knowing anyway.
 };
 
-/// What a command found.
+/// The result of a command.
 struct Report {
   Answer answer;                      ///< Its word is empty where there is no verdict.
   std::string details;                ///< Stands below the answer, unless only the verdict is wanted.

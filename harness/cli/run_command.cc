@@ -12,6 +12,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/console.h"
+#include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/output_file.h"
@@ -215,21 +216,30 @@ int ReplayRun(const RunRequest& request) {
   return expected ? kSuccess : kDisagreement;
 }
 
+/// Prints the shipped scenarios, of one that cannot be read why not.
+void ListScenarios() {
+  const std::filesystem::path folder = FindShippedFile(kScenarios.folder);
+  for (const std::string& name : kScenarios.ListNames()) {
+    const std::string file = (folder / (name + ".toml")).string();
+    try {
+      const Scenario scenario = ParseScenario(ReadBytes(file), file, folder, {});
+      fmt::print("{}\n", Wrap(fmt::format("{:<14} {}", name, scenario.description), 15));
+    } catch (const InputError& error) {
+      fmt::print("{:<14} unreadable: {}\n", name, error.what());
+    }
+  }
+  fmt::print(
+      "\nTo change one, copy its file with the folders that it names, or --set its keys:\n  cp {} my.toml\n",
+      QuoteForShell((folder / "paper.toml").string()));
+}
+
 int Run(const RunRequest& request) {
   if (request.scenario.empty() && !request.list && request.replay.empty())
     throw UsageError("SCENARIO (or --list, or --replay) is required");
   if (request.json_file == "-" && (request.quiet || request.all))
     throw UsageError("--json without a file excludes --quiet and --all");
   if (request.list) {
-    for (const ShippedScenario& scenario : ListShippedScenarios()) {
-      const std::string line = fmt::format("{:<14} {}{}", scenario.name,
-                                           scenario.is_readable ? "" : "unreadable: ", scenario.description);
-      fmt::print("{}\n", scenario.is_readable ? Wrap(line, 15) : line);
-    }
-    fmt::print(
-        "\nTo change one, copy its file with the folders that it names, or --set its keys:\n  cp {} "
-        "my.toml\n",
-        QuoteForShell((FindShippedFile(kScenarios.folder) / "paper.toml").string()));
+    ListScenarios();
     return kSuccess;
   }
   if (!request.replay.empty()) return ReplayRun(request);

@@ -19,6 +19,7 @@
 #include "harness/base/console.h"
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
+#include "harness/base/worst.h"
 #include "harness/cli/output_file.h"
 #include "harness/cli/terminal.h"
 #include "harness/engine/machine.h"
@@ -93,15 +94,6 @@ ScenarioFiles OpenWhole(const std::filesystem::path& path, const std::vector<std
   return files;
 }
 
-/// The largest finite value, without its sign.
-double CalcLargest(const RowMatrixXd& values) {
-  double largest = 0.0;
-  for (const double value : values.reshaped()) {
-    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
-  }
-  return largest;
-}
-
 /// Puts a key's line into a table of the text; an own table at its end when it has none.
 void InsertKey(const std::string& table, const std::string& line, std::string* text) {
   const std::string header = "[" + table + "]\n";
@@ -114,20 +106,6 @@ void InsertKey(const std::string& table, const std::string& line, std::string* t
 }
 
 }  // namespace
-
-std::vector<ShippedScenario> ListShippedScenarios() {
-  std::vector<ShippedScenario> scenarios;
-  const std::filesystem::path folder = FindShippedFile(kScenarios.folder);
-  for (const std::string& name : kScenarios.ListNames()) {
-    const std::string file = (folder / (name + ".toml")).string();
-    try {
-      scenarios.push_back({name, ParseScenario(ReadBytes(file), file, folder, {}).description});
-    } catch (const InputError& error) {
-      scenarios.push_back({name, error.what(), /*is_readable=*/false});
-    }
-  }
-  return scenarios;
-}
 
 ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<std::string>& overrides,
                            std::uint64_t seed) {
@@ -215,7 +193,7 @@ ReplayDifference RecordedRun::Compare(const std::filesystem::path& other_log) co
     ++first.signals;
     const RowMatrixXd recorded = log_.ReadSignal(signal.name);
     const RowMatrixXd now = other.ReadSignal(signal.name);
-    const double scale = CalcLargest(recorded);
+    const double scale = MaxAbsFinite(recorded);
     for (long row = 0; row < recorded.rows(); ++row) {
       for (Eigen::Index col = 0; col < recorded.cols(); ++col) {
         const double value = row < now.rows() ? now(row, col) : std::numeric_limits<double>::quiet_NaN();

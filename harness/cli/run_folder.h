@@ -27,15 +27,6 @@ struct ScenarioFiles {
 ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<std::string>& overrides,
                            std::uint64_t seed);
 
-struct ShippedScenario {
-  std::string name;         ///< Its file's, without .toml.
-  std::string description;  ///< Of one that cannot be read: why not.
-  bool is_readable = true;
-};
-
-/// In alphabetic order.
-std::vector<ShippedScenario> ListShippedScenarios();
-
 /// @throws InputError when a folder has something in it.
 void RequireFree(const std::filesystem::path& folder);
 

@@ -1,6 +1,7 @@
 #include "harness/cli/run_report.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "controller/common/text.h"
+#include "harness/base/bounded_json.h"
 #include "harness/base/check_record.h"
 #include "harness/checks/check_table.h"
 
@@ -100,53 +102,44 @@ void AddChecks(const Setup& setup, const ClosedLoop& loop, Detail detail, Report
 }
 
 /// "approach 0.0, close 3.4, ..." with the time each began.
-void AddTask(const ClosedLoop& loop, Report* report) {
-  const PickAndPlace& task = loop.task()->task();
-  std::string line;
-  for (const PhaseEntry& entry : task.history()) {
-    line += fmt::format("{}{} {:.1f}", line.empty() ? "" : ", ", NameOf(entry.phase), entry.time);
-  }
-  report->Add("phases, s: " + line);
-  if (!task.first_failure().empty()) report->Add(fmt::format("first attempt: {}", task.first_failure()));
-  if (task.scale() != 1.0) report->Add(fmt::format("weighed: {:.3f} of the stated mass", task.scale()));
+void AddTask(const Json& task, Report* report) {
+  std::vector<std::string> phases;
+  for (const Json& phase : task["phases"])
+    phases.push_back(fmt::format("{} {:.1f}", FindText(phase, "/phase"), phase["begin_s"].get<double>()));
+  report->Add(fmt::format("phases, s: {}", fmt::join(phases, ", ")));
+  const std::string failure = FindText(task, "/first_failure");
+  if (!failure.empty()) report->Add("first attempt: " + failure);
+  const double scale = task["weighed"];
+  if (scale != 1.0) report->Add(fmt::format("weighed: {:.3f} of the stated mass", scale));
   report->Add(fmt::format("object pushed by {:.1e} m before it was held; largest step of a torque {:.1e} N m",
-                          task.push(), loop.task()->torque_jump()));
-}
-
-void AddTracking(const Scenario& scenario, const TrackingStatistics& tracking, Report* report) {
-  if (scenario.joint_task() != nullptr) {
-    report->Add(fmt::format("joints: largest error {:.2e} rad (rms {:.2e})", tracking.joints.max,
-                            tracking.joints.rms()));
-    return;
-  }
-  report->Add(fmt::format("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad",
-                          tracking.position.max, tracking.position.rms(), tracking.orientation.max));
+                          task["push_m"].get<double>(), task["torque_jump_max_N_m"].get<double>()));
 }
 
 /// At which motors torques were cut off, and how long; the longest first.
-void AddLimits(std::span<const Motor> motors, const std::vector<LimitedTorque>& limited, Report* report) {
-  std::vector<size_t> order;
-  for (size_t i = 0; i < limited.size(); ++i)
-    if (limited[i].time > 0.0) order.push_back(i);
-  std::ranges::sort(order, [&](size_t a, size_t b) { return limited[a].time > limited[b].time; });
-  std::string text = "torque limited: ";
-  for (const size_t i : order)
-    text += fmt::format("{}{} for {:.3f} s from {:.3f} s, by up to {:.3g}", i == order.front() ? "" : "; ",
-                        motors[i].name, limited[i].time, limited[i].first, limited[i].most);
-  report->Add(order.empty() ? text + "at no joint" : text);
+void AddLimits(const Json& limited, Report* report) {
+  std::vector<Json> longest(limited.begin(), limited.end());
+  std::ranges::stable_sort(longest, std::ranges::greater(),
+                           [](const Json& one) { return one["time_s"].get<double>(); });
+  std::vector<std::string> texts;
+  for (const Json& one : longest)
+    texts.push_back(fmt::format("{} for {:.3f} s from {:.3f} s, by up to {:.3g}", FindText(one, "/motor"),
+                                one["time_s"].get<double>(), one["first_s"].get<double>(),
+                                one["most_N_m"].get<double>()));
+  if (texts.empty()) texts.emplace_back("at no joint");
+  report->Add(fmt::format("torque limited: {}", fmt::join(texts, "; ")));
 }
 
 /// Which bodies came nearest to each other that must not touch.
-void AddClearance(const Clearance& clearance, Report* report) {
-  const Clearance::Nearest* nearest = nullptr;
-  for (int i = 0; i < kPairClassCount; ++i) {
-    const Clearance::Nearest& one = clearance.nearest(static_cast<PairClass>(i));
-    if (one.pair >= 0 && (nearest == nullptr || one.distance < nearest->distance)) nearest = &one;
-  }
-  if (nearest == nullptr) return;
+void AddClearance(const Json& clearance, Report* report) {
+  const auto distance = [](const Json& one) { return one["smallest_m"].get<double>(); };
+  const auto nearest =
+      std::min_element(clearance.begin(), clearance.end(),
+                       [&](const Json& a, const Json& b) { return distance(a) < distance(b); });
+  if (nearest == clearance.end()) return;
   report->Add(fmt::format("smallest clearance: {}, {:.1f} mm {} at t = {:.3f} s",
-                          clearance.Describe(nearest->pair), 1e3 * std::abs(nearest->distance),
-                          nearest->distance < 0.0 ? "into each other" : "apart", nearest->time));
+                          FindText(*nearest, "/bodies"), 1e3 * std::abs(distance(*nearest)),
+                          distance(*nearest) < 0.0 ? "into each other" : "apart",
+                          (*nearest)["at_time_s"].get<double>()));
 }
 
 /// How far the paper's rigid contacts are from the plant's.
@@ -158,28 +151,23 @@ void AddRigidContacts(const RunChecks& checks, Report* report) {
                           acceleration.worst, checks.Find("contact_force").worst));
 }
 
-void AddSpeed(const ClosedLoop& loop, const RunResult& result, Report* report) {
-  const LoopTimes& times = loop.times();
-  const double scale = 1e6 / static_cast<double>(std::max(loop.record().step, 1L));
-  report->Add(fmt::format(
-      "\n{:.1f} x real time; us/step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, recording "
-      "{:.0f}",
-      result.wall_seconds > 0.0 ? loop.time() / result.wall_seconds : 0.0, scale * times.plant,
-      scale * times.controller, scale * times.cross_check, scale * result.recording_seconds));
-}
-
 /// Adds what stands below the verdict.
-void AddDetails(const Setup& setup, const ClosedLoop& loop, const RunResult& result, Detail detail,
-                Report* report) {
+void AddDetails(const Setup& setup, const ClosedLoop& loop, const TrackingStatistics& tracking,
+                const Json& summary, Detail detail, Report* report) {
   const Scenario& scenario = setup.scenario();
   report->Add("\n" + scenario.name + ": " + scenario.description);
   report->Add(fmt::format("{:.3f} of {:.3f} s simulated, {} steps of {} ms", loop.time(), scenario.duration,
                           loop.record().step, 1e3 * scenario.plant.time_step));
   if (scenario.tolerance > 0.0)
     report->Add(fmt::format("judged to a relative tolerance of {:g}", scenario.tolerance));
-  for (const std::string& key : scenario.imperfections.declared)
-    report->Add(fmt::format("declared: {}", key));
-  if (loop.record().step > 0) AddTracking(scenario, result.tracking, report);
+  for (const std::string& key : scenario.imperfections.declared) report->Add("declared: " + key);
+  if (loop.record().step > 0)
+    report->Add(
+        scenario.joint_task() != nullptr
+            ? fmt::format("joints: largest error {:.2e} rad (rms {:.2e})", tracking.joints.max,
+                          tracking.joints.rms())
+            : fmt::format("object: position error {:.2e} m (rms {:.2e}), orientation error {:.2e} rad",
+                          tracking.position.max, tracking.position.rms(), tracking.orientation.max));
   if (scenario.control.kappa == ContactSource::kIntegrated) {
     const ContactDrift& drift = loop.largest_drift();
     report->Add(
@@ -187,14 +175,18 @@ void AddDetails(const Setup& setup, const ClosedLoop& loop, const RunResult& res
                     "{:.2e} rad in psi",
                     drift.object, drift.fingertip, drift.psi));
   }
-  if (scenario.imperfections.actuation.saturates()) AddLimits(loop.motors(), result.limited, report);
-  if (loop.task() != nullptr) AddTask(loop, report);
+  if (summary.contains("torque_limited")) AddLimits(summary["torque_limited"], report);
+  if (summary.contains("task")) AddTask(summary["task"], report);
   if (loop.is_checking()) {
-    AddClearance(loop.checks().clearance(), report);
+    AddClearance(summary["clearance"], report);
     AddRigidContacts(loop.checks(), report);
     AddChecks(setup, loop, detail, report);
   }
-  AddSpeed(loop, result, report);
+  const auto speed = [&](const char* key) { return summary["speed"][key].get<double>(); };
+  report->Add(fmt::format(
+      "\n{:.1f} x real time; us/step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, recording {:.0f}",
+      speed("real_time_factor"), speed("plant_us_per_step"), speed("controller_us_per_step"),
+      speed("cross_check_us_per_step"), speed("recording_us_per_step")));
 }
 
 }  // namespace
@@ -207,7 +199,7 @@ Report MakeRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult
                 .suite = "run." + setup.scenario().name,
                 .seconds = result.wall_seconds,
                 .failure = result.failure};
-  AddDetails(setup, loop, result, detail, &report);
+  AddDetails(setup, loop, result.tracking, summary, detail, &report);
   if (!folder.empty()) report.Add("log and summary in " + folder);
   if (loop.is_checking()) {
     for (const CheckRecord& check : setup.constants().records) report.AddCase("constant", check, "");

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
@@ -19,9 +20,8 @@
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
+#include "harness/cli/report.h"
 #include "harness/cli/run_folder.h"
-#include "harness/cli/terminal.h"
 #include "harness/run/own_controller.h"
 #include "harness/study/study_findings.h"
 #include "harness/study/study_runner.h"
@@ -34,11 +34,14 @@ namespace {
 struct StudyRequest {
   std::string study;
   std::string database;
+  std::vector<std::string> databases;  ///< To be merged.
   std::string shard;
   OwnController controller;
   std::uint64_t jobs = 0;
   bool retry_failed = false;
   bool quiet = false;
+  long trial = 0;
+  std::string out, json_file;
 };
 
 /// A study's array job.
@@ -255,75 +258,75 @@ int MergeStudies(const std::string& out, const std::vector<std::string>& databas
                           missing.size(), trials.size(), ListNumbers(missing)));
 }
 
-int ShowTrial(const std::string& database, long number, const std::string& json) {
-  const StudyStore store = StudyStore::Open(database);
+int ShowTrial(const StudyRequest& request) {
+  const StudyStore store = StudyStore::Open(request.database);
   const Study& study = store.study();
-  const std::optional<TrialRow> found = store.FindRow(number);
-  if (!found) throw InputError(fmt::format("{}: trial {}: has no row", database, number));
+  const std::optional<TrialRow> found = store.FindRow(request.trial);
+  if (!found) throw InputError(fmt::format("{}: trial {}: has no row", request.database, request.trial));
   const TrialRow& row = *found;
-  OutputFile(json).Write(ToJson(study, row));
-  if (json == "-") return kSuccess;
-  fmt::print("trial {}, seed {}: {}{}{}\n", row.trial.number, row.trial.seed, NameOf(row.result.outcome),
-             row.result.failure.empty() ? "" : ": ", row.result.failure);
-  const auto print = [](std::string_view name, const std::string& value) {
-    fmt::print("  {:<36}  {}\n", name, value);
+  Report report{.data = ToJson(study, row)};
+  report.details =
+      fmt::format("trial {}, seed {}: {}{}{}\n", row.trial.number, row.trial.seed, NameOf(row.result.outcome),
+                  row.result.failure.empty() ? "" : ": ", row.result.failure);
+  const auto add = [&](std::string_view name, const std::string& value) {
+    report.details += fmt::format("  {:<36}  {}\n", name, value);
   };
   for (size_t i = 0; i < study.variations.size(); ++i)
-    print(study.variations[i].key, FormatValue(study.variations[i], row.trial.parameters[i]));
+    add(study.variations[i].key, FormatValue(study.variations[i], row.trial.parameters[i]));
   for (size_t i = 0; i < kMetrics.size(); ++i) {
     const double value = row.result.metrics[i];
     if (std::isfinite(value))
-      print(kMetrics[i].name, fmt::format("{:.6g}{}", value, ShowUnit(kMetrics[i].name)));
+      add(kMetrics[i].name, fmt::format("{:.6g}{}", value, ShowUnit(kMetrics[i].name)));
   }
-  fmt::print("{}\n", MakeReplayCommand(study, row.trial));
+  report.last = MakeReplayCommand(study, row.trial) + "\n";
+  return ReportOutput({.json_file = request.json_file}).Write(report);
+}
+
+int WriteReport(const StudyRequest& request) {
+  RequirePageName(request.out);
+  const StudySummary summary = SummariseStudy(StudyStore::Open(request.database));
+  OutputFile(request.json_file).Write(summary.json);
+  if (request.json_file.empty() || !request.out.empty())
+    OutputFile(request.out.empty() ? request.database + ".html" : request.out).Write(MakeStudyPage(summary));
+  return kSuccess;
+}
+
+int WriteCsv(const StudyRequest& request) {
+  const StudyStore store = StudyStore::Open(request.database);
+  OutputFile file(request.out.empty() ? request.database + ".csv" : request.out);
+  WriteStudyCsv(store, [&](std::string_view text) { file.Append(std::string(text)); });
+  file.Finish();
   return kSuccess;
 }
 
 /// Adds those commands that read a study's database: report, show, export.
-void AddReadCommands(CLI::App* study) {
-  const auto database = std::make_shared<std::string>();
-  const auto out = std::make_shared<std::string>();
-  const auto add_database = [&](CLI::App* command) {
-    AddOption(command, "DB", database.get(), "The study's database")->required();
+void AddReadCommands(CLI::App* study, const std::shared_ptr<StudyRequest>& request) {
+  const auto add = [&](const std::string& name, const std::string& help,
+                       const std::array<const char*, 2>& examples) {
+    CLI::App* const command = AddCommand(study, name, help, examples);
+    AddOption(command, "DB", &request->database, "The study's database")->required();
+    return command;
   };
+  CLI::App* const report =
+      add("report", "Write an HTML page of a study's results",
+          {"dexcheck study report gains.sqlite", "dexcheck study report gains.sqlite --page gains.html"});
+  AddOption(report, "--page FILE.html", &request->out,
+            "The page (DB.html by default); - for standard output");
+  AddJsonOption(report, "the same data", &request->json_file);
+  SetAction(report, [=] { return WriteReport(*request); });
 
-  CLI::App* const report = AddCommand(
-      study, "report", "Write an HTML page of a study's results",
-      {"dexcheck study report gains.sqlite", "dexcheck study report gains.sqlite --page gains.html"});
-  add_database(report);
-  AddOption(report, "--page FILE.html", out.get(), "The page (DB.html by default); - for standard output");
-  const auto json = std::make_shared<std::string>();
-  AddJsonOption(report, "the same data", json.get());
-  SetAction(report, [=] {
-    RequirePageName(*out);
-    const StudySummary summary = SummariseStudy(StudyStore::Open(*database));
-    OutputFile(*json).Write(summary.json);
-    if (!json->empty() && out->empty()) return kSuccess;
-    OutputFile(out->empty() ? *database + ".html" : *out).Write(MakeStudyPage(summary));
-    return kSuccess;
-  });
+  CLI::App* const show =
+      add("show", "Print one trial and the command that repeats it",
+          {"dexcheck study show gains.sqlite 3", "dexcheck study show gains.sqlite 3 --json trial.json"});
+  AddOption(show, "TRIAL", &request->trial, "Number of the trial")->required();
+  AddJsonOption(show, "the trial", &request->json_file);
+  SetAction(show, [=] { return ShowTrial(*request); });
 
-  CLI::App* const show = AddCommand(
-      study, "show", "Print one trial and the command that repeats it",
-      {"dexcheck study show gains.sqlite 3", "dexcheck study show gains.sqlite 3 --json trial.json"});
-  add_database(show);
-  const auto number = std::make_shared<long>(0);
-  AddOption(show, "TRIAL", number.get(), "Number of the trial")->required();
-  AddJsonOption(show, "the trial", json.get());
-  SetAction(show, [=] { return ShowTrial(*database, *number, *json); });
-
-  CLI::App* const csv = AddCommand(
-      study, "export", "Write all trials as CSV",
-      {"dexcheck study export gains.sqlite", "dexcheck study export gains.sqlite --out gains.csv"});
-  add_database(csv);
-  AddOption(csv, "--out FILE.csv", out.get(), "The file (DB.csv by default); - for standard output");
-  SetAction(csv, [=] {
-    const StudyStore store = StudyStore::Open(*database);
-    OutputFile file(out->empty() ? *database + ".csv" : *out);
-    WriteStudyCsv(store, [&](std::string_view text) { file.Append(std::string(text)); });
-    file.Finish();
-    return kSuccess;
-  });
+  CLI::App* const csv =
+      add("export", "Write all trials as CSV",
+          {"dexcheck study export gains.sqlite", "dexcheck study export gains.sqlite --out gains.csv"});
+  AddOption(csv, "--out FILE.csv", &request->out, "The file (DB.csv by default); - for standard output");
+  SetAction(csv, [=] { return WriteCsv(*request); });
 }
 
 }  // namespace
@@ -334,7 +337,6 @@ void AddStudyCommand(CLI::App* app) {
                  {"dexcheck study run gains --db gains.sqlite", "dexcheck study report gains.sqlite"});
   study->require_subcommand(1);
   const auto request = std::make_shared<StudyRequest>();
-  const auto databases = std::make_shared<std::vector<std::string>>();
   const auto whole = WholeNumber(1, 1000000);
   const auto add_quiet = [&](CLI::App* command) {
     command->add_flag("--quiet", request->quiet, "Print nothing but errors");
@@ -358,11 +360,11 @@ void AddStudyCommand(CLI::App* app) {
                                      {"dexcheck study merge all.sqlite part1.sqlite part2.sqlite",
                                       "dexcheck study merge all.sqlite part1.sqlite --quiet"});
   AddOption(merge, "OUT", &request->database, "Database that gets all trials")->required();
-  AddOption(merge, "DB", databases.get(), "Databases of the same study")->required();
+  AddOption(merge, "DB", &request->databases, "Databases of the same study")->required();
   add_quiet(merge);
-  SetAction(merge, [=] { return MergeStudies(request->database, *databases, request->quiet); });
+  SetAction(merge, [=] { return MergeStudies(request->database, request->databases, request->quiet); });
 
-  AddReadCommands(study);
+  AddReadCommands(study, request);
 
   CLI::App* const slurm = AddCommand(study, "slurm", "Print an array job for Slurm that makes the study",
                                      {"dexcheck study slurm gains --tasks 16",

@@ -42,13 +42,13 @@ std::vector<Picture> DrawConfigurations(const RecordedFrames& run, bool holds, b
   const MjDataPtr data = MakeData(*run.model);
   if (FindWay(*run.model, run.frames, data.get()).length > kLongWay) options.inset = kCourseCamera;
   options.panel = false;
-  VideoPainter painter({run.model.get(), &run.frames}, options);
+  const RunPainter paint = MakePainter({run.model.get(), &run.frames}, options);
   const std::string who = holds ? "Robot and object" : "Robot";
   const std::array<Picture, 2> pictures = {
       {{folder / "fig11a.png", is_papers ? "11 (a)" : "", who + " at the beginning"},
        {folder / "fig11b.png", is_papers ? "11 (b)" : "", who + " at the end"}}};
-  WritePng(pictures[0].file, painter.Paint(0.0));
-  WritePng(pictures[1].file, painter.Paint(run.frames.duration()));
+  WritePng(pictures[0].file, paint(0.0));
+  WritePng(pictures[1].file, paint(run.frames.duration()));
   return {pictures.begin(), pictures.end()};
 }
 

@@ -11,6 +11,7 @@
 #include <sstream>
 
 #include "harness/base/files.h"
+#include "harness/base/worst.h"
 #include "harness/report/page_frame.h"
 
 namespace dexcheck {
@@ -145,14 +146,6 @@ std::vector<ComparedNumber> CompareChecks(const std::vector<const RunData*>& run
   return checks;
 }
 
-double LargestOf(const Eigen::Ref<const VectorXd>& values) {
-  double largest = 0.0;
-  for (const double value : values) {
-    if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
-  }
-  return largest;
-}
-
 /// The difference of two numbers; 0 where both are the same infinity or both are none.
 double Subtract(double a, double b) {
   if (std::isfinite(a) && std::isfinite(b)) return std::abs(a - b);
@@ -167,7 +160,7 @@ SignalDifference CompareSignal(const SignalInfo& signal, const RunData& first, c
   std::map<std::string, double> sizes;
   for (int k = 0; k < signal.width; ++k) {
     double& size = sizes[units[static_cast<size_t>(k)]];
-    size = std::max({size, LargestOf(a.col(k)), LargestOf(b.col(k))});
+    size = std::max({size, MaxAbsFinite(a.col(k)), MaxAbsFinite(b.col(k))});
   }
   SignalDifference result{signal.name, units[0], "", 0, run};
   result.size = sizes[units[0]];

@@ -1,5 +1,8 @@
 #include "harness/run/runner.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -52,13 +55,12 @@ void WeighDeclared(const Setup& setup, const ClosedLoop& loop, const std::filesy
   ideal.imperfections = {};
   const std::optional<double> without = Repeat(ideal, attribution.check, robot, mjcf, should_stop);
   if (!without) return;
-  std::string keys;
-  for (const std::string& key : scenario.imperfections.declared) keys += (keys.empty() ? "" : ", ") + key;
   const double explained = std::max(0.0, 1.0 - *without / check.worst);
   constexpr double kMost = 0.5;
   if (explained >= kMost) SetCause(Cause::kDeclared, result);
-  attribution.evidence += "; without what the scenario declares (" + Abbreviate(keys) + ") it is " +
-                          FormatNumber(*without, 3) + " " + check.unit + ": that explains " +
+  attribution.evidence += "; without what the scenario declares (" +
+                          Abbreviate(fmt::format("{}", fmt::join(scenario.imperfections.declared, ", "))) +
+                          ") it is " + FormatNumber(*without, 3) + " " + check.unit + ": that explains " +
                           FormatNumber(100.0 * explained, 3) + " % of the error";
 }
 

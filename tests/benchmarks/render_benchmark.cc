@@ -40,11 +40,10 @@ void DrawBare(const mjModel& model, const RunFrames& run, const VideoOptions& op
   const MjModelPtr sized(mj_copyModel(nullptr, &model));
   sized->vis.global.offwidth = width;
   sized->vis.global.offheight = height;
-  const RenderOptions defaults;
   sized->vis.quality.offsamples = 0;
   sized->vis.quality.shadowsize = options.shadow_size;
-  sized->vis.quality.numslices = defaults.slices;
-  sized->vis.quality.numstacks = RenderOptions::kStacks;
+  sized->vis.quality.numslices = 24;
+  sized->vis.quality.numstacks = 8;
   mjv_defaultScene(&scene);
   mjv_makeScene(&model, &scene, 2000);
   scene.flags[mjRND_REFLECTION] = 0;
@@ -87,11 +86,7 @@ int Run(long frames) {
     }
   });
   const MeasuredTime video = Measure([&] {
-    EncodingOptions encoding;
-    encoding.width = options.width;
-    encoding.height = options.height;
-    encoding.fps = options.fps;
-    VideoWriter video(folder.path() / "video.mp4", encoding);
+    VideoWriter video(folder.path() / "video.mp4", options);
     RenderVideo({model.get(), &run}, options, &video);
     video.Finish();
   });

@@ -210,9 +210,7 @@ TEST_F(RendererTest, StillLooksAsItDid) {
   options.width = kWidth;
   options.height = kHeight;
   options.inset = "grasp";
-  const auto paint = [&](const RunFrames& run) {
-    return VideoPainter({model_.get(), &run}, options).Paint(0.1);
-  };
+  const auto paint = [&](const RunFrames& run) { return MakePainter({model_.get(), &run}, options)(0.1); };
   const Image image = paint(run_);
   const std::string path = SourcePath("/tests/renders/golden_still.png");
   if (std::getenv("DEXCHECK_WRITE_GOLDEN") != nullptr) WritePng(path, image);

@@ -43,19 +43,13 @@ class VideoTest : public ::testing::Test {
 
   bool Video(const fs::path& path, const RunView& run, const VideoOptions& options,
              const std::function<bool(long, long)>& progress = {}) {
-    EncodingOptions encoding;
-    encoding.width = options.width;
-    encoding.height = options.height;
-    encoding.fps = options.fps;
-    VideoWriter video(path, encoding);
+    VideoWriter video(path, options);
     if (!RenderVideo(run, options, &video, progress)) return false;
     video.Finish();
     return true;
   }
 
-  Image Paint(const VideoOptions& options, double time) const {
-    return VideoPainter(view_, options).Paint(time);
-  }
+  Image Paint(const VideoOptions& options, double time) const { return MakePainter(view_, options)(time); }
 
   MjModelPtr model_ = LoadMjcf(SourcePath("/mjcf/scene.xml"));
   RunFrames run_ = MakeKinematicRun(*model_, 0.5);
@@ -127,9 +121,9 @@ TEST_F(VideoTest, TheCourseCameraStandsStill) {
   VideoOptions options = MakeOptions(/*panel=*/false);
   const auto differences = [&](const char* camera) {
     options.camera = camera;
-    VideoPainter painter(view_, options);
-    const Image first = painter.Paint(0.0);
-    const Image last = painter.Paint(2.7);  // the floor's pattern repeats each metre
+    const RunPainter paint = MakePainter(view_, options);
+    const Image first = paint(0.0);
+    const Image last = paint(2.7);  // the floor's pattern repeats each metre
     // Places of the robot at either end, and the left border.
     return std::array<double, 3>{Difference(first.rgb.data(), last.rgb.data(), 0, 50, 0, 100),
                                  Difference(first.rgb.data(), last.rgb.data(), 50, 100, 0, 100),
@@ -155,11 +149,11 @@ TEST_F(VideoTest, VideoDoesNotDependOnTheNumberOfProcesses) {
 }
 
 TEST_F(VideoTest, FramesAreTheStillsOfTheirTimes) {
-  VideoPainter painter(view_, MakeOptions());
-  const Image start = painter.Paint(0.0);
-  EXPECT_NE(painter.Paint(0.3).rgb, start.rgb);
-  EXPECT_EQ(painter.Paint(0.0).rgb, start.rgb);
-  EXPECT_EQ(painter.Paint(9.0).rgb, painter.Paint(0.5).rgb) << "after its end a run stands still";
+  const RunPainter paint = MakePainter(view_, MakeOptions());
+  const Image start = paint(0.0);
+  EXPECT_NE(paint(0.3).rgb, start.rgb);
+  EXPECT_EQ(paint(0.0).rgb, start.rgb);
+  EXPECT_EQ(paint(9.0).rgb, paint(0.5).rgb) << "after its end a run stands still";
 }
 
 TEST_F(VideoTest, LostContactsAreNotDrawn) {
