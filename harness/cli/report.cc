@@ -100,7 +100,7 @@ void Report::SetIncomplete(long done, long total, const std::string& what) {
 }
 
 ReportOutput::ReportOutput(const Outputs& outputs)
-    : outputs_(outputs),
+    : quiet_(outputs.quiet),
       json_(outputs.json_file),
       junit_(outputs.junit_file),
       page_(RequirePageName(outputs.page_file)) {}
@@ -112,9 +112,8 @@ ExitCode ReportOutput::Write(const Report& report, bool is_printed) {
   page_.Write(report.page);
   if (is_printed) {
     if (!report.answer.word.empty()) PrintAnswer(report.answer);
-    if (!outputs_.quiet) fmt::print("{}", report.details);
+    if (!quiet_) fmt::print("{}", report.details);
     fmt::print("{}", report.last);
-    if (!outputs_.page_file.empty() && !outputs_.quiet) fmt::print("page: {}\n", outputs_.page_file);
   }
   if (report.code == kDisagreement || report.failure.empty()) return report.code;
   return ReportFailure(report.failure);

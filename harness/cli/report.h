@@ -66,7 +66,7 @@ class ReportOutput {
   ExitCode Write(const Report& report, bool is_printed = true);
 
  private:
-  Outputs outputs_;
+  bool quiet_;
   OutputFile json_, junit_, page_;
 };
 

@@ -8,6 +8,7 @@
 #include "harness/cli/output_file.h"
 #include "harness/cli/run_folder.h"
 #include "harness/report/page.h"
+#include "harness/report/tex_table.h"
 
 namespace dexcheck::cli {
 namespace {

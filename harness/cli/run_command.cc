@@ -134,8 +134,7 @@ int RunScenario(const RunRequest& request) {
   if (!folder.empty()) OutputFile(folder / "summary.json").Write(text);
   if (!folder.empty() && !result.gain_card.empty())
     OutputFile(folder / "gain_card.toml").Write(result.gain_card);
-  Report report = MakeRunReport(setup, runner.loop(), result, summary, folder.string(),
-                                request.all ? Detail::kAll : Detail::kCategories);
+  Report report = MakeRunReport(setup, runner.loop(), result, summary, folder.string(), request.all);
   if (result.attribution.cause == Cause::kModel && files.scenario.model_overrides.empty())
     report.answer.remarks.push_back(fmt::format("why: dexcheck diagnose {} {}",
                                                 QuoteForShell(files.robot.string()),

@@ -71,8 +71,7 @@ void AddCategory(CheckCategory kind, const ClosedLoop& loop, std::vector<TableRo
     rows->push_back({{NameOf(kind), std::to_string(passing.not_reached), "not reached"}});
 }
 
-void AddChecks(const Setup& setup, const ClosedLoop& loop, Detail detail, Report* report) {
-  const bool all = detail == Detail::kAll;
+void AddChecks(const Setup& setup, const ClosedLoop& loop, bool all, Report* report) {
   std::vector<TableRow> rows = {
       {{"category", "", all ? "check" : "checks, nearest to its bound", "worst", "bound"}}};
   const auto& constants = setup.constants().records;
@@ -153,7 +152,7 @@ void AddRigidContacts(const RunChecks& checks, Report* report) {
 
 /// Adds what stands below the verdict.
 void AddDetails(const Setup& setup, const ClosedLoop& loop, const TrackingStatistics& tracking,
-                const Json& summary, Detail detail, Report* report) {
+                const Json& summary, bool all, Report* report) {
   const Scenario& scenario = setup.scenario();
   report->Add("\n" + scenario.name + ": " + scenario.description);
   report->Add(fmt::format("{:.3f} of {:.3f} s simulated, {} steps of {} ms", loop.time(), scenario.duration,
@@ -180,7 +179,7 @@ void AddDetails(const Setup& setup, const ClosedLoop& loop, const TrackingStatis
   if (loop.is_checking()) {
     AddClearance(summary["clearance"], report);
     AddRigidContacts(loop.checks(), report);
-    AddChecks(setup, loop, detail, report);
+    AddChecks(setup, loop, all, report);
   }
   const auto speed = [&](const char* key) { return summary["speed"][key].get<double>(); };
   report->Add(fmt::format(
@@ -192,14 +191,14 @@ void AddDetails(const Setup& setup, const ClosedLoop& loop, const TrackingStatis
 }  // namespace
 
 Report MakeRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result, const Json& summary,
-                     const std::string& folder, Detail detail) {
+                     const std::string& folder, bool all) {
   const std::vector<CheckRecord> checks = ListChecksOf(loop);
   Report report{.answer = MakeRunAnswer(summary, checks),
                 .data = summary,
                 .suite = "run." + setup.scenario().name,
                 .seconds = result.wall_seconds,
                 .failure = result.failure};
-  AddDetails(setup, loop, result.tracking, summary, detail, &report);
+  AddDetails(setup, loop, result.tracking, summary, all, &report);
   if (!folder.empty()) report.Add("log and summary in " + folder);
   if (loop.is_checking()) {
     for (const CheckRecord& check : setup.constants().records) report.AddCase("constant", check, "");

@@ -21,6 +21,7 @@
 #include "harness/checks/check_table.h"
 #include "harness/checks/failure_cause.h"
 #include "harness/report/page_frame.h"
+#include "harness/report/run_figures.h"
 #include "harness/run/run_summary.h"
 #include "renders/renderer.h"
 #include "renders/video.h"

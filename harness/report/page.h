@@ -85,17 +85,4 @@ ReportFiles MakeReportFiles(const std::filesystem::path& run_dir);
 void WriteRunReport(const std::filesystem::path& run_dir, const ReportFiles& files,
                     const SceneMaker& make_scene = MakeRunScene);
 
-/// Panels of the paper's Figures 12 and 13, as far as the log has their signals, and plots beside them: the
-/// object's error, the other torques, how far friction is used.
-std::vector<Figure> MakeMotionFigures(const RunData& run);
-
-/// One figure for each category of checks that was evaluated: its checks' values as fractions of their
-/// bounds.
-std::vector<Figure> MakeResidualFigures(const RunData& run);
-
-/// A table for LaTeX with booktabs: tracking errors, and of each category of checks the one nearest its
-/// bound. Its caption names the verdict, the program's commit and the command.
-/// @throws InputError that names the log when its summary is none.
-std::string MakeTexTable(const RunData& run);
-
 }  // namespace dexcheck

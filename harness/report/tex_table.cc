@@ -1,3 +1,5 @@
+#include "harness/report/tex_table.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,7 +8,6 @@
 
 #include "controller/common/errors.h"
 #include "harness/base/bounded_json.h"
-#include "harness/report/page.h"
 
 namespace dexcheck {
 namespace {

@@ -1,3 +1,5 @@
+#include "harness/study/sqlite_file.h"
+
 #include <sqlite3.h>
 #include <unistd.h>
 
@@ -10,7 +12,6 @@
 #include "harness/base/console.h"
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
-#include "harness/study/study_store.h"
 
 namespace dexcheck {
 namespace {

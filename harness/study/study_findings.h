@@ -1,6 +1,6 @@
 #pragma once
 
-// Findings of a study, in sentences.
+// Findings of a study in sentences, its pages, and its rows for other programs.
 
 #include <functional>
 #include <nlohmann/json.hpp>
@@ -11,6 +11,7 @@
 #include "harness/study/error_budget.h"
 #include "harness/study/search.h"
 #include "harness/study/study_store.h"
+#include "harness/study/study_summary.h"
 #include "harness/study/trial.h"
 
 namespace dexcheck {
@@ -29,22 +30,6 @@ std::string MakeGainCard(const StudyInputs& inputs, const std::vector<TrialRow>&
 
 /// Lines: how far a study has come, its outcomes, and what is found so far.
 std::string DescribeProgress(const StudyStore& store);
-
-// A study for others: its results as data, its pages, and its rows for other programs.
-
-/// Most trials whose numbers are in a page; of more the trials of points that a hash draws, and the best.
-constexpr size_t kMostShown = 20000;
-
-struct StudySummary {
-  /// The study, how far it has come, outcomes, findings, the best points and sensitivities. Its keys
-  /// are in the README.
-  nlohmann::ordered_json json;
-  /// Doubles, row by row, of the trials that are shown: the numbers of json["columns"].
-  std::string values;
-};
-
-/// Summarises all trials that are done.
-StudySummary SummariseStudy(const StudyStore& store);
 
 /// One HTML page that loads nothing else: what the study finds, outcomes and metrics over the varied keys,
 /// the best trials, and the command that repeats each.

@@ -1,5 +1,6 @@
 #include "harness/study/study_store.h"
 
+#include <SQLiteCpp/Transaction.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <sqlite3.h>

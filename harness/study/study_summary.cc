@@ -1,3 +1,5 @@
+#include "harness/study/study_summary.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
