@@ -277,8 +277,7 @@ class OneWay {
     for (const size_t c : deal.candidates) {
       for (const LinkPatch& patch : candidates[c].patches)
         Merge(before.link(patch.link), patch.right, &pair_.mutable_a()->link(patch.link));
-      // A site without a patch stays as it is.
-      // A body that the file had not is none of the parts that are measured.
+      // A site without a patch stays as it is; a body that the file had not is none of the measured parts.
       const bool is_measured =
           !candidates[c].patches.empty() && !pair_.node(candidates[c].link).parts.empty();
       for (const Site& site : candidates[c].sites)
