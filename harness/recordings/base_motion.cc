@@ -213,17 +213,23 @@ Push FindTimes(const RecordingSet& recordings, const TorqueRows& rows, const Vec
   std::vector<Eigen::RowVectorXd> columns;
   std::vector<double> y;
   constexpr double kBeside = 0.5;  // s: what is held out may hide an end
-  const double beside = push.reach + kBeside;
+  const std::vector<TorqueBalance::Block>& all =
+      recordings[static_cast<size_t>(push.recording)].fit->blocks();
+  // What is missing to a stuck torque passes through zero, so that it stands out for a part of the time.
+  const double beside = push.is_stuck ? all.back().to - all.front().from : push.reach + kBeside;
   for (const TorqueRows::Part& part : rows.parts) {
     if (part.recording != static_cast<size_t>(push.recording)) continue;
     for (size_t b = 0; b < part.balance->blocks().size(); ++b) {
       const TorqueBalance::Block& block = part.balance->blocks()[b];
       if (block.to < push.from - 2.0 * beside || block.from > push.to + 2.0 * beside) continue;
+      const Eigen::RowVectorXd own = CalcPushColumns(recordings, push, part, b);
+      if (own.isZero(0.0)) continue;
       blocks.push_back(&block);
-      columns.push_back(CalcPushColumns(recordings, push, part, b));
+      columns.push_back(own);
       y.push_back(left[part.begin + part.within + static_cast<Index>(b)]);
     }
   }
+  if (blocks.empty()) return push;
   const auto explained = [&](double from, double to) {
     const Index width = columns.front().size();
     MatrixXd G = MatrixXd::Zero(width, width);
@@ -236,12 +242,13 @@ Push FindTimes(const RecordingSet& recordings, const TorqueRows& rows, const Vec
     }
     return b.dot(SolveLeastSquares(G, b));
   };
-  constexpr double kGrid = 0.2;
+  constexpr double kGrid = 0.2, kSteps = 200.0;
+  const double step = std::max(kGrid * push.reach, beside / kSteps);
   for (int twice = 0; twice < 2; ++twice) {
     push.from = FindMost([&](double from) { return explained(from, push.to); }, push.from - beside,
-                         push.from + beside, kGrid * push.reach);
+                         push.from + beside, step);
     push.to = FindMost([&](double to) { return explained(push.from, to); }, push.to - beside,
-                       push.to + beside, kGrid * push.reach);
+                       push.to + beside, step);
   }
   return push;
 }

@@ -159,6 +159,9 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
   } else if (fault.kind == kSaturation) {
     one.value = LimitOf(fault, a);
     one.error = error[1] * one.value;
+  } else if (fault.kind == kPositionGain) {
+    one.value = 1.0 / (1.0 - a[0]);
+    one.error *= Square(one.value);
   } else if (fault.kind == kSpring) {
     one.detail = "at rest at " + FormatNumber(-a[1] / a[0], 3);
   } else if (fault.kind == kShaking) {

@@ -47,7 +47,13 @@ class Judge {
     result_.rows = set_.rows();
     result_.notes = set_.notes();
     result_.has_other_times = set_.has_other_times();
-    for (const Fault& fault : set_.faults()) result_.causes.push_back(MakeCause(fault));
+    for (const Fault& fault : set_.faults()) {
+      Explanation& one = result_.causes.emplace_back(MakeCause(fault));
+      // Velocities show no more of a clock.
+      if (fault.fault != "velocity gain" || fault.place != "all joints" || !(fault.value > 0.0)) continue;
+      one.faults.push_back({"clock", fault.place, fault.value, 0.0, "", "times the true time"});
+      one.SetOutcome();
+    }
     ReportSeconds();
     return std::move(result_);
   }
@@ -214,9 +220,10 @@ class Judge {
 
   void Name(const CauseTerm& term) {
     const TorqueFault& fault = estimator_.faults()[term.candidate];
-    if (fault.kind == TorqueFault::kDelay && std::abs(term.amplitude[0]) <= 1.5 * set_.step()) {
-      result_.notes.push_back(fmt::format("{}: torques are {:.2g} s late, less than two rows: no cause",
-                                          fault.place, term.amplitude[0]));
+    const bool is_delay = fault.kind == TorqueFault::kDelay || fault.kind == TorqueFault::kLatePosition;
+    if (is_delay && std::abs(term.amplitude[0]) <= 1.5 * set_.step()) {
+      result_.notes.push_back(fmt::format("{}: {} {:.2g} s, less than two rows: no cause", fault.place,
+                                          fault.fault, term.amplitude[0]));
       return;
     }
     const auto is_integrator = [this](size_t candidate) {

@@ -156,6 +156,7 @@ class MotionDesigner {
   VectorXd Follow(const SeriesMotion& motion, TorqueBalance* balance, VectorXd* squares) {
     constexpr size_t kEvery = 4;
     RecordedSample sample;
+    sample.jerk = sample.snap = VectorXd::Zero(model_.num_joints());
     sample.torque_rate = VectorXd::Zero(model_.num_joints());
     sample.most_torque = VectorXd::Constant(model_.num_joints(), std::numeric_limits<double>::infinity());
     sample.friction.resize(model_.num_joints(), kFrictionShapes);

@@ -289,7 +289,11 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
         velocity >= 0
             ? VectorXd(fitted.col(velocity))
             : VectorXd(fitted.col(position).tail<kOrder>().cwiseProduct(Eigen::Vector4d(1.0, 2.0, 3.0, 4.0)));
-    if (stands_) sample_.qd[joint] = sample_.qdd[joint] = 0.0;
+    sample_.jerk[joint] = velocity >= 0 ? 2.0 * fitted(2, velocity) : 6.0 * fitted(3, position);
+    sample_.snap[joint] = velocity >= 0 ? 6.0 * fitted(3, velocity) : 24.0 * fitted(4, position);
+    if (stands_)
+      for (VectorXd* const each : {&sample_.qd, &sample_.qdd, &sample_.jerk, &sample_.snap})
+        (*each)[joint] = 0.0;
     AverageFriction(joint, times, rate, C.row(0).transpose());
     const int torque = ChannelOf(Effort(), joint);
     if (torque < 0) continue;
@@ -326,12 +330,14 @@ void MotionFit::CalcSpeeds() {
   }
   const VectorXd speeds = (squares / std::max(1.0, count)).cwiseSqrt();
   shape_velocities_ = ListShapeVelocities(speeds, refinements_.stribeck, refinements_.smooth);
-  constexpr double kSlow = 2e-3, kMoving = 0.2;
+  // A joint that moves far does so at few times where joints move one after another.
+  constexpr double kSlow = 2e-3, kMoving = 0.2, kMovingFar = 0.02, kFar = 0.02;
   constexpr double kHeld = 2e-3;  // rad or m, that a joint gives under its friction
   noise_.rest = noise_.rest.cwiseMax(kSlow * speeds);
   for (int joint = 0; joint < n; ++joint) {
     const double least = model_->joint(joint).dry_friction > 0.0 ? kHeld : 0.0;
-    moves_.push_back(moving[joint] > kMoving * count && highest[joint] - lowest[joint] > least);
+    const double span = highest[joint] - lowest[joint];
+    moves_.push_back(moving[joint] > (span > kFar ? kMovingFar : kMoving) * count && span > least);
   }
 }
 

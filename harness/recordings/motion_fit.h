@@ -39,7 +39,7 @@ struct Refinements {
 struct RecordedSample {
   double time = 0.0;
   double passed = 0.0;  ///< Since the first row, s.
-  VectorXd q, qd, qdd;
+  VectorXd q, qd, qdd, jerk, snap;
   VectorXd torque;                    ///< Measured, or the current; smoothed like the motion.
   VectorXd most_torque;               ///< The largest of those that were read ahead, less its noise.
   VectorXd torque_rate;               ///< Per s, the secant's over a delay that is known.
@@ -127,7 +127,9 @@ class MotionFit {
   void CheckVelocities();
   /// Returns what is wrong with a joint's velocities, if they are not its position's derivative. A lag of
   /// less than two rows is no fault: it is kept in velocity_lags_.
-  std::optional<Fault> CheckVelocity(int joint, const std::vector<size_t>& centres, size_t half);
+  /// @param least that a gain is off.
+  std::optional<Fault> CheckVelocity(int joint, const std::vector<size_t>& centres, size_t half,
+                                     double least);
   /// Moves the velocities' polynomials to the positions' times, or their accelerations alone (Refinements).
   void AdvanceVelocities(MatrixXd* fitted) const;
   [[nodiscard]] std::vector<size_t> ListCentres(size_t half) const;

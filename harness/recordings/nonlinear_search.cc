@@ -294,8 +294,7 @@ std::optional<NonlinearFault> FindNonlinearFault(const RobotModel& model, Record
     const double misfit = CalcMisfit(samples.CalcResiduals(one, few));
     const auto same = std::ranges::find_if(faults, [&](const auto& known) {
       const NonlinearFault& other = known.second;
-      return one.number != Number::kNone && one.number == other.number && one.joint == other.joint &&
-             one.has_right_rates == other.has_right_rates;
+      return one.number != Number::kNone && one.number == other.number && one.joint == other.joint;
     });
     if (same == faults.end()) {
       faults.emplace_back(misfit, std::move(one));

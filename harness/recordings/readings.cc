@@ -49,12 +49,18 @@ Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const N
   return one;
 }
 
+/// Returns how many numbers explain a judgement, with those that velocities are off by.
+long CountNumbers(const RecordingJudgement& judgement) {
+  return judgement.by_causes.numbers +
+         std::ranges::count(judgement.causes, CauseChannel::kMeasurement, &Explanation::channel);
+}
+
 /// Whether a nonlinear fault may say more simply what was found, or what was not.
 bool MayBeOtherwise(const RecordingJudgement& judgement) {
   constexpr long kFewNumbers = 1;
   if (std::ranges::any_of(judgement.unjudged, &UnjudgedJoint::has_no_gain)) return true;
   constexpr double kWorse = 1.15;  // than all numbers of the model together: a reason to look, no verdict
-  return !judgement.IsWhole() || judgement.by_causes.numbers > kFewNumbers ||
+  return !judgement.IsWhole() || CountNumbers(judgement) > kFewNumbers ||
          judgement.by_causes.IsWorseThan(judgement.by_all, kWorse);
 }
 
@@ -85,7 +91,7 @@ bool LeavesLess(const RecordingJudgement& one, const RecordingJudgement& other, 
 /// Returns how many numbers explain a reading; a wrong geometry of the model is rarer than a wrong body.
 long CountNumbers(const Readings::Reading& reading) {
   constexpr long kRarer = 2;
-  long count = reading.judgement.by_causes.numbers;
+  long count = CountNumbers(reading.judgement);
   for (const NonlinearFault& one : reading.faults)
     count += one.CountNumbers() + (one.IsOfModel() ? kRarer : 0);
   return count;
@@ -199,7 +205,7 @@ void Readings::Search(bool of_model, Reading* best) {
     // A wrong geometry always explains a part of something.
     if (of_model) Refine(&now);
     // Fewer numbers than before, or none at all.
-    const long others = now.judgement.by_causes.numbers;
+    const long others = CountNumbers(now.judgement);
     const bool replaces_others = now.judgement.IsWhole() && (others < CountNumbers(*best) ||
                                                              (others == 0 && !best->judgement.IsWhole()));
     const bool is_better = (!of_model || replaces_others) && IsBetter(now, *best);

@@ -28,6 +28,8 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   forces_.resize(n, 6);
   by_position_.resize(n, n);
   shaking_.resize(n, 12);
+  along_.resize(n, kAlong * n);
+  torques_in_time_.resize(n, 3);
   torques_.resize(n);
   late_.resize(n);
   q_.resize(n);
@@ -57,13 +59,18 @@ void TorqueBalance::ListColumns(bool has_currents) {
     columns.push_back({TorqueColumn::kTorque, joint});
     for (const auto kind : {TorqueColumn::kPosition, TorqueColumn::kBacklash, TorqueColumn::kElastic})
       for (int other = 0; other < model_->num_joints(); ++other) columns.push_back({kind, other});
+    for (int other = 0; other < model_->num_joints(); ++other) {
+      columns.push_back({TorqueColumn::kLatePosition, other});
+      columns.push_back({TorqueColumn::kPositionGain, other});
+      for (int k = 0; k < kTurns; ++k) columns.push_back({TorqueColumn::kTurn, other, k});
+    }
     for (int k = 0; k < 2 * kCutOffs; ++k) columns.push_back({TorqueColumn::kCutOff, joint, k});
     for (int k = 0; k < 3; ++k) columns.push_back({TorqueColumn::kGravity, 0, k});
     if (has_currents) columns.push_back({TorqueColumn::kCurrent, joint});
     for (const auto kind :
          {TorqueColumn::kRate, TorqueColumn::kLate, TorqueColumn::kOffset, TorqueColumn::kDry,
-          TorqueColumn::kViscous, TorqueColumn::kSquare, TorqueColumn::kTime, TorqueColumn::kAcceleration,
-          TorqueColumn::kLoad, TorqueColumn::kAngle})
+          TorqueColumn::kViscous, TorqueColumn::kSquare, TorqueColumn::kTime, TorqueColumn::kDryTime,
+          TorqueColumn::kAcceleration, TorqueColumn::kLoad, TorqueColumn::kAngle})
       columns.push_back({kind, joint});
     for (int k = 0; k < kFrictionShapes; ++k) columns.push_back({TorqueColumn::kFriction, joint, k});
     for (int k = 0; refinements_.shaking > 0.0 && k < shaking_.cols(); ++k)
@@ -105,7 +112,13 @@ double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const Rec
       return std::copysign(by_position_(joint, column.index),
                            by_position_(joint, column.index) * torques_[column.index]);
     case TorqueColumn::kElastic:
-      return by_position_(joint, column.index) * torques_[column.index];
+      return along_(joint, kAlong * column.index);
+    case TorqueColumn::kLatePosition:
+      return along_(joint, kAlong * column.index + 1);
+    case TorqueColumn::kPositionGain:
+      return along_(joint, kAlong * column.index + 2);
+    case TorqueColumn::kTurn:
+      return along_(joint, kAlong * column.index + 3 + column.component);
     case TorqueColumn::kCutOff:
       return CalcCutOff(joint, column.component, sample);
     case TorqueColumn::kGravity:
@@ -126,6 +139,8 @@ double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const Rec
       return sample.qd[joint] * std::abs(sample.qd[joint]);
     case TorqueColumn::kTime:
       return sample.passed;
+    case TorqueColumn::kDryTime:
+      return direction * sample.passed;
     case TorqueColumn::kAcceleration:
       return sample.qdd[joint];
     case TorqueColumn::kFriction:
@@ -186,6 +201,47 @@ void TorqueBalance::CalcShakingColumns(const RecordedSample& sample) {
   shaking_.rightCols<6>() = (shaking_.rightCols<6>().colwise() - torques_).eval() / kStep;
 }
 
+Vector3d TorqueBalance::CalcMotionChange(int joint, int k, const RecordedSample& sample) const {
+  const double rate = sample.qd[joint], acceleration = sample.qdd[joint];
+  if (k == 0) return torques_in_time_.row(joint).transpose();
+  if (k == 1) return {rate, acceleration, sample.jerk[joint]};
+  if (k == 2) return {sample.q[joint], rate, acceleration};
+  const double turns = k < 5 ? 1.0 : 2.0, angle = turns * sample.q[joint];
+  const double e = k % 2 == 1 ? std::sin(angle) : std::cos(angle);
+  const double slope = turns * (k % 2 == 1 ? std::cos(angle) : -std::sin(angle));
+  return {e, slope * rate, slope * acceleration - turns * turns * e * Square(rate)};
+}
+
+void TorqueBalance::CalcMotionColumns(const RecordedSample& sample) {
+  constexpr double kStep = 1e-6;
+  // The torques and their derivatives by time.
+  constexpr double kTime = 1e-3;  // s
+  VectorXd q, qd, qdd;
+  MatrixXd beside(torques_.size(), 2);
+  for (const int k : {0, 1}) {
+    const double t = k == 0 ? -kTime : kTime, s = 0.5 * t * t;
+    q = sample.q + t * sample.qd + s * sample.qdd;
+    qd = sample.qd + t * sample.qdd + s * sample.jerk;
+    qdd = sample.qdd + t * sample.jerk + s * sample.snap;
+    regressor_.SetMotion(q, qd, qdd, sample.base);
+    regressor_.CalcTorques(beside.col(k));
+  }
+  torques_in_time_ << torques_, (beside.col(1) - beside.col(0)) / (2.0 * kTime),
+      (beside.rowwise().sum() - 2.0 * torques_) / Square(kTime);
+  q = sample.q, qd = sample.qd, qdd = sample.qdd;
+  for (Index joint = 0; joint < q.size(); ++joint)
+    for (int k = 0; k < kAlong; ++k) {
+      const Vector3d change = CalcMotionChange(static_cast<int>(joint), k, sample);
+      q[joint] += kStep * change[0], qd[joint] += kStep * change[1], qdd[joint] += kStep * change[2];
+      auto column = along_.col(kAlong * joint + k);
+      regressor_.SetMotion(q, qd, qdd, sample.base);
+      regressor_.CalcTorques(column);
+      column = ((column - torques_) / kStep).eval();
+      column[joint] += model_->joint(static_cast<int>(joint)).damping * change[1];
+      q[joint] = sample.q[joint], qd[joint] = sample.qd[joint], qdd[joint] = sample.qdd[joint];
+    }
+}
+
 void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& is_judged) {
   q_ = sample.q;
   for (Index k = 0; k < q_.size(); ++k) {
@@ -200,6 +256,8 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
   regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   regressor_.CalcTorques(torques_);
   late_ = (late_ - torques_) / kDelay;
+  CalcMotionColumns(sample);
+  regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   regressor_.CalcGravityColumns(gravity_);
   if (!refinements_.gravity.isZero()) {
     BaseMotion turned = sample.base;

@@ -19,21 +19,25 @@ namespace dexcheck {
 /// A column of a joint's row.
 struct TorqueColumn {
   enum Kind {
-    kBody,      ///< By a link's BodyVector: index is the link, component 0 to 9.
-    kTorque,    ///< The model's torque of joint index, with its friction.
-    kPosition,  ///< By the position of joint index.
-    kBacklash,  ///< The same, with the sign of that joint's torque.
-    kElastic,   ///< The same, times that joint's torque.
-    kCutOff,    ///< By component: 2 of each torque at which it may have been cut off.
-    kGravity,   ///< By component of gravity.
-    kRate,      ///< Of the measured torque.
-    kLate,      ///< By a delay of the velocities.
-    kCurrent,   ///< Measured.
-    kOffset,    ///< 1
-    kDry,       ///< Direction of motion.
-    kViscous,   ///< Velocity.
-    kSquare,    ///< Velocity times its size.
-    kTime,      ///< Since the first row, s.
+    kBody,          ///< By a link's BodyVector: index is the link, component 0 to 9.
+    kTorque,        ///< The model's torque of joint index, with its friction.
+    kPosition,      ///< By the position of joint index.
+    kBacklash,      ///< The same, with the sign of that joint's torque.
+    kElastic,       ///< By its position's yielding to the torque of joint index, with its derivatives.
+    kLatePosition,  ///< By a delay of the position of joint index, with its derivatives.
+    kPositionGain,  ///< By the logarithm of the gain of joint index's position.
+    kTurn,  ///< By its error along a turn, with its derivatives: sine and cosine of once, then twice a turn.
+    kCutOff,   ///< By component: 2 of each torque at which it may have been cut off.
+    kGravity,  ///< By component of gravity.
+    kRate,     ///< Of the measured torque.
+    kLate,     ///< By a delay of the velocities.
+    kCurrent,  ///< Measured.
+    kOffset,   ///< 1
+    kDry,      ///< Direction of motion.
+    kViscous,  ///< Velocity.
+    kSquare,   ///< Velocity times its size.
+    kTime,     ///< Since the first row, s.
+    kDryTime,  ///< That times the direction of motion.
     kAcceleration,
     kFriction,  ///< RecordedSample::friction, by component.
     kLoad,      ///< Direction times the size of the model's torque.
@@ -51,6 +55,8 @@ struct TorqueColumn {
 /// Torques at which a recorded torque may have been cut off (the first), or a motor's, which was less than
 /// recorded: what is beyond, and by the logarithm of the limit.
 inline constexpr int kCutOffs = 3;
+/// Components of kTurn.
+inline constexpr int kTurns = 4;
 /// Such a torque, as far as is known. @param component of kCutOff. @param most that was recorded.
 double FindCutOff(const Refinements& refinements, int joint, int component, double most);
 
@@ -101,10 +107,15 @@ class TorqueBalance {
  private:
   static constexpr Eigen::Index kPart = 128;  // rows that are multiplied at once
   static constexpr size_t kMostBlocks = 512;
+  static constexpr int kAlong = 3 + kTurns;
 
   void ListColumns(bool has_currents);
   /// Returns the torques that balance a force at each wrench's point and a moment, in its axes: n x 6 each.
   [[nodiscard]] MatrixXd CalcWrenchColumns();
+  /// Returns by what a unit of a fault of along_ changes a joint's position, velocity and acceleration.
+  [[nodiscard]] Vector3d CalcMotionChange(int joint, int k, const RecordedSample& sample) const;
+  /// Computes along_.
+  void CalcMotionColumns(const RecordedSample& sample);
   void CalcShakingColumns(const RecordedSample& sample);
   /// The model's, at a joint.
   [[nodiscard]] double CalcFriction(int joint, const RecordedSample& sample) const;
@@ -130,6 +141,8 @@ class TorqueBalance {
   double block_samples_ = 1.0;
   // at the sample
   MatrixXd bodies_, gravity_, forces_, by_position_, shaking_;
+  MatrixXd torques_in_time_;  // n x 3: the model's, and their derivatives
+  MatrixXd along_;            // n x kAlong n: kElastic, kLatePosition, kPositionGain, kTurn of each joint
   std::vector<WrenchPlace> wrenches_;
   MatrixXd wrench_squares_;
   VectorXd torques_, late_, q_, steps_, residual_;

@@ -147,6 +147,8 @@ class FaultList {
                0.0, true, 1.0);
     AddAtJoint(kOffset, joint, "torque offset", torque, {TorqueColumn::kOffset, joint}, 0.0, false, most);
     AddAtJoint(kDrift, joint, "torque drift", torque + "/s", {TorqueColumn::kTime, joint}, 0.0, false, most);
+    AddAtJoint(kDryDrift, joint, "dry friction that changes with time", torque + "/s",
+               {TorqueColumn::kDryTime, joint}, 0.0, false, most);
     AddAtJoint(kArmature, joint, "armature", turns ? "kg m^2" : "kg", {TorqueColumn::kAcceleration, joint},
                modelled.armature, true, FindMostPer(joint, extents_.acceleration, kSlow));
     AddAtJoint(kTorqueGain, joint, "torque gain", "", {TorqueColumn::kTorque, joint}, 1.0, false, kMostGain)
@@ -181,6 +183,21 @@ class FaultList {
     Add(kZero, joint, "position offset", "joint " + modelled.name, turns ? "rad" : "m",
         {{{{TorqueColumn::kPosition, joint}, -1, -1.0}}})
         .most = VectorXd::Constant(1, std::min(turns ? kPi : 1.0, width > 0.0 ? width : kInfinite));
+    TorqueFault& late = Add(kLatePosition, joint, "delay of the position", "joint " + modelled.name, "s",
+                            {{{{TorqueColumn::kLatePosition, joint}}}});
+    LimitDelay(&late);
+    constexpr double kMostOff = 0.3;
+    Add(kPositionGain, joint, "position gain", "joint " + modelled.name, "",
+        {{{{TorqueColumn::kPositionGain, joint}, -1, -1.0}}}, 1.0)
+        .is_possible = IsNoLonger(kMostOff, VectorXd::Zero(1));
+    for (const int harmonics : {2, kTurns}) {
+      if (!turns) break;
+      TorqueFault& turn = Add(kEccentricity, joint, "eccentric encoder", "joint " + modelled.name, "rad", {});
+      for (int k = 0; k < harmonics; ++k) turn.sums.push_back({{{TorqueColumn::kTurn, joint, k}, -1, -1.0}});
+      constexpr double kMostError = 0.1;
+      turn.is_possible = IsNoLonger(kMostError, VectorXd::Zero(harmonics));
+      turn.is_ordinary = harmonics == 2;
+    }
   }
 
   /// Adds friction whose velocity is roughly known: the shape there, and what the logarithm of the velocity
@@ -328,7 +345,7 @@ class FaultList {
 
   /// A torque that has nothing to do with the model's is no gain.
   static bool IsGain(const VectorXd& a) {
-    constexpr double kLeast = 0.01;
+    constexpr double kLeast = 5e-4;
     return std::abs(1.0 + a[0]) > kLeast;
   }
   /// Whether the recorded torque has nothing of the model's.
