@@ -123,6 +123,15 @@ double CauseDescription::LimitOf(const TorqueFault& fault, const VectorXd& a) co
          (1.0 + a[1] / a[0]);
 }
 
+std::string DescribeGeometry(const RobotModel& model, const LinkFrames& frames, const NonlinearFault& fault) {
+  const int parent = model.joint(fault.joint).parent;
+  const Matrix3d R = parent < 0 ? Matrix3d(Matrix3d::Identity()) : frames.Find(parent).linear();
+  return (fault.number == NonlinearFault::Number::kPlacement
+              ? "moved by " + ShowVector(R.transpose() * fault.shift) + " m"
+              : "turned by " + ShowVector(R.transpose() * fault.turn) + " rad") +
+         (parent < 0 ? std::string(" in the base's frame") : " in " + frames.NameOf(model.link_name(parent)));
+}
+
 Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, VectorXd error) const {
   if (error.size() == 0) error = VectorXd::Zero(a.size());
   Fault one;
@@ -159,6 +168,9 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
   } else if (fault.kind == kSaturation) {
     one.value = LimitOf(fault, a);
     one.error = error[1] * one.value;
+  } else if (fault.kind == kGeometry) {
+    one.detail = DescribeGeometry(
+        model_, frames_, GeometryFault(model_, fault.index, fault.sums.front().front().column.component, a));
   } else if (fault.kind == kPositionGain) {
     one.value = 1.0 / (1.0 - a[0]);
     one.error *= Square(one.value);

@@ -21,6 +21,9 @@ struct FoundFault {
   [[nodiscard]] bool HasSize() const;
 };
 
+/// Returns by what a joint is displaced, in its parent's frame.
+std::string DescribeGeometry(const RobotModel& model, const LinkFrames& frames, const NonlinearFault& fault);
+
 class CauseDescription {
  public:
   /// @param names of the recordings. All must outlive this.

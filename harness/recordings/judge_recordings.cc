@@ -32,9 +32,11 @@ double RoundToPercent(double velocity) {
 /// One judgement, put into words.
 class Judge {
  public:
+  /// @param has_others whether other faults were undone.
   Judge(const RobotModel& model, std::vector<Recording>* recordings, const JudgeOptions& options,
-        const std::function<bool(long)>& on_rows)
-      : set_(model, recordings, options, on_rows),
+        bool has_others, const std::function<bool(long)>& on_rows)
+      : has_others_(has_others),
+        set_(model, recordings, options, on_rows),
         estimator_(&set_, options.most_causes),
         description_(set_, estimator_, options.frames, names_) {
     for (const Recording& one : *recordings) names_.push_back(one.name);
@@ -282,6 +284,19 @@ class Judge {
     const VectorXd shown = term.error.array().isFinite().select(term.error, 0.0);
     const Index sizes = fault.HasVelocity() || fault.kind == TorqueFault::kSpring ? 1 : term.amplitude.size();
     if (term.amplitude.head(sizes).norm() < kErrors * shown.head(sizes).norm()) return true;
+    // Noise is known to a factor of two: beside another cause, less may be what that one leaves.
+    if ((has_others_ || !result_.found.empty()) && IsNoiseWithout(term)) return true;
+    // So is the inertia of a payload, which has one besides its mass and place.
+    const auto is_of_payload = [&](size_t candidate) {
+      const TorqueFault& one = estimator_.faults()[candidate];
+      return one.kind == TorqueFault::kInertia &&
+             std::ranges::any_of(result_.found, [&](const FoundFault& before) {
+               return before.fault.kind == TorqueFault::kPayload && before.fault.index == one.index;
+             });
+    };
+    if (is_of_payload(term.candidate) ||
+        std::ranges::any_of(term.same, [&](const auto& one) { return is_of_payload(one.first); }))
+      return true;
     if (result_.IsWhole()) return false;
     // A payload is named by its mass and place, and has an inertia besides.
     const bool is_beaten = result_.IsBeaten() && fault.kind != TorqueFault::kPayload;
@@ -290,10 +305,16 @@ class Judge {
     constexpr double kMostLeft = 0.1;
     // A force on a link for a while fits a part of anything that is large then.
     if (fault.kind == TorqueFault::kPush && fault.push.joint < 0) return true;
-    const bool is_nearest =
-        std::ranges::all_of(result_.found, [](const FoundFault& before) { return before.is_named; });
+    // What another cause leaves is not told as friction, nor what one that is no friction explains as well.
+    const bool is_nearest = !has_others_ && std::ranges::all_of(result_.found, [](const FoundFault& before) {
+      return before.is_named && before.fault.IsFriction();
+    });
+    constexpr double kAsMuch = 0.5;
+    const bool is_entangled = std::ranges::any_of(estimator_.selection().terms, [&](const CauseTerm& other) {
+      return !estimator_.faults()[other.candidate].IsFriction() && other.fraction > kAsMuch * term.fraction;
+    });
     if (fault.IsFriction())
-      return !is_nearest ||
+      return !is_nearest || is_entangled ||
              ((fault.kind == TorqueFault::kStribeckFriction || fault.kind == TorqueFault::kLoadFriction ||
                fault.kind == TorqueFault::kSquareFriction) &&
               term.fraction - left < kMuch);
@@ -303,6 +324,21 @@ class Judge {
            (result_.left > kFar && fault.kind != TorqueFault::kPayload && term.fraction <= kMost * left);
   }
 
+  /// Whether the other causes leave no more than noise.
+  [[nodiscard]] bool IsNoiseWithout(const CauseTerm& term) const {
+    std::vector<CauseTerm> others = estimator_.selection().terms;
+    std::erase_if(others, [&](const CauseTerm& one) { return one.candidate == term.candidate; });
+    const TorqueRows& rows = estimator_.rows();
+    const VectorXd left = estimator_.CalcLeft(others);
+    return std::ranges::all_of(rows.parts, [&](const TorqueRows::Part& part) {
+      const ReadRecording& one = set_[part.recording];
+      const auto place = static_cast<Index>(part.place);
+      return one.weight[place] * left.segment(part.begin, part.size).norm() <=
+             kMostNoise * one.noise[place] * std::sqrt(part.samples);
+    });
+  }
+
+  bool has_others_;
   std::vector<std::string> names_;
   RecordingSet set_;
   TorqueEstimator estimator_;
@@ -335,10 +371,11 @@ bool RecordingJudgement::Agrees() const {
 RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recording>* recordings,
                                    const JudgeOptions& options,
                                    const std::function<bool(long rows)>& on_rows) {
-  const auto judge = [&](const RobotModel& corrected, const Refinements& refinements, const auto& count) {
+  const auto judge = [&](const RobotModel& corrected, const Refinements& refinements, bool has_others,
+                         const auto& count) {
     JudgeOptions refined = options;
     refined.refinements = refinements;
-    return Judge(corrected, recordings, refined, count).Run();
+    return Judge(corrected, recordings, refined, has_others, count).Run();
   };
   return Readings(model, recordings, options, on_rows, judge).Run();
 }

@@ -207,18 +207,15 @@ void NonlinearFault::Undo(Recording* recording) const {
 }
 
 void NonlinearFault::Undo(RecordedSample* sample) const {
-  if (!has_right_rates) sample->qd /= clock;
-  sample->qdd /= has_right_rates ? clock : clock * clock;
+  sample->qd /= clock;
+  sample->qdd /= clock * clock;
   for (VectorXd* const each : {&sample->torque, &sample->q, &sample->qd, &sample->qdd, &sample->direction}) {
-    const bool is_position = each == &sample->q;
-    const bool is_changed =
-        each == &sample->torque ? is_torque : is_motion && (is_position || !has_right_rates);
-    if (!is_changed) continue;
+    if (!(each == &sample->torque ? is_torque : is_motion)) continue;
     if (!order.empty()) {
       const VectorXd recorded = *each;
       for (size_t i = 0; i < order.size(); ++i) (*each)[order[i]] = recorded[static_cast<Index>(i)];
     } else if (joint >= 0) {
-      (*each)[joint] = factor * (*each)[joint] + (is_position ? offset : 0.0);
+      (*each)[joint] = factor * (*each)[joint] + (each == &sample->q ? offset : 0.0);
     } else if (each != &sample->direction) {
       *each *= factor;
     }
@@ -239,6 +236,14 @@ void NonlinearFault::Undo(RobotSpec* robot) const {
   moved.body.inertia = back * moved.body.inertia * back.transpose();
   for (Joint& one : robot->joints)
     if (one.parent == joint) one.X_PB = Pose(back) * one.X_PB;
+}
+
+MatrixXd FindDirections(const RobotModel& model, int joint) {
+  const Joint& one = model.joint(joint);
+  const Vector3d axis =
+      one.X_PB.linear() * Eigen::AngleAxisd(one.mdh.alpha, Vector3d::UnitX()) * Vector3d::UnitZ();
+  const Vector3d first = axis.unitOrthogonal();
+  return (MatrixXd(3, 3) << first, axis.cross(first), axis).finished();
 }
 
 std::vector<NonlinearFault> ListNonlinearFaults(const RobotModel& model, const Recording& recording,

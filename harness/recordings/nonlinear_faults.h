@@ -40,6 +40,9 @@ struct NonlinearFault {
   void Undo(RobotSpec* robot) const;
 };
 
+/// Directions in its parent's frame: two orthogonal to a joint's axis, and the axis (3 x 3).
+MatrixXd FindDirections(const RobotModel& model, int joint);
+
 /// Returns those that nothing in the recording speaks against: its units, its columns, and the joints'
 /// ranges.
 /// @param ranges lowest and highest recorded positions (n x 2), rad or m.

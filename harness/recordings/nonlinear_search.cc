@@ -166,15 +166,6 @@ double CalcValue(const NonlinearFault& fault) {
   return 0.0;
 }
 
-/// Directions in its parent's frame: two orthogonal to a joint's axis, and the axis (3 x 3).
-MatrixXd FindDirections(const RobotModel& model, int joint) {
-  const Joint& one = model.joint(joint);
-  const Vector3d axis =
-      one.X_PB.linear() * Eigen::AngleAxisd(one.mdh.alpha, Vector3d::UnitX()) * Vector3d::UnitZ();
-  const Vector3d first = axis.unitOrthogonal();
-  return (MatrixXd(3, 3) << first, axis.cross(first), axis).finished();
-}
-
 /// Returns how many samples say something of their own: those that follow one another have similar noise.
 double CountIndependent(const MatrixXd& residuals) {
   double next = 0.0, all = std::numeric_limits<double>::min();

@@ -26,13 +26,7 @@ Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const N
   Explanation one = MakeCause(found.fault);
   if (found.IsOfModel()) {
     one.channel = CauseChannel::kBalance;
-    const int parent = model.joint(found.joint).parent;
-    const Matrix3d R = parent < 0 ? Matrix3d(Matrix3d::Identity()) : frames.Find(parent).linear();
-    one.faults.front().detail =
-        (found.number == NonlinearFault::Number::kPlacement
-             ? "moved by " + FormatVector(R.transpose() * found.shift, 3) + " m"
-             : "turned by " + FormatVector(R.transpose() * found.turn, 3) + " rad") +
-        (parent < 0 ? std::string(" in the base's frame") : " in " + frames.NameOf(model.link_name(parent)));
+    one.faults.front().detail = DescribeGeometry(model, frames, found);
     if (!found.shows_all) one.faults.front().detail += ", as far as this motion shows it";
   }
   const bool is_offset = found.offset != 0.0 && found.joint >= 0 && model.joint(found.joint).parent < 0;
@@ -49,9 +43,16 @@ Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const N
   return one;
 }
 
-/// Returns how many numbers explain a judgement, with those that velocities are off by.
+/// A wrong geometry of the model is rarer than a wrong body.
+constexpr long kRarer = 2;
+
+/// Returns how many numbers explain a judgement, with those that velocities are off by. A displacement and a
+/// gain of positions are first guesses of what is searched for.
 long CountNumbers(const RecordingJudgement& judgement) {
-  return judgement.by_causes.numbers +
+  const long guesses = std::ranges::count_if(judgement.found, [](const FoundFault& one) {
+    return one.fault.kind == TorqueFault::kGeometry || one.fault.kind == TorqueFault::kPositionGain;
+  });
+  return judgement.by_causes.numbers + (kRarer + 1) * guesses +
          std::ranges::count(judgement.causes, CauseChannel::kMeasurement, &Explanation::channel);
 }
 
@@ -88,9 +89,8 @@ bool LeavesLess(const RecordingJudgement& one, const RecordingJudgement& other, 
   return most > of_joint && all > of_all;
 }
 
-/// Returns how many numbers explain a reading; a wrong geometry of the model is rarer than a wrong body.
+/// Returns how many numbers explain a reading.
 long CountNumbers(const Readings::Reading& reading) {
-  constexpr long kRarer = 2;
   long count = CountNumbers(reading.judgement);
   for (const NonlinearFault& one : reading.faults)
     count += one.CountNumbers() + (one.IsOfModel() ? kRarer : 0);
@@ -108,8 +108,7 @@ bool IsBetter(const Readings::Reading& one, const Readings::Reading& other) {
   constexpr double kMuchBetter = 1.25;
   constexpr long kFewMore = 2;
   if (a.IsWhole() && more <= kFewMore && b.by_causes.IsWorseThan(a.by_causes, kMuchBetter)) return true;
-  if (a.IsWhole())
-    return more < 0 && CalcLeft(a) < CalcLeft(b) + kWorse * static_cast<double>(a.balances.size());
+  if (a.IsWhole()) return more < 0 && !LeavesLess(b, a, 0.0, kWorse * static_cast<double>(a.balances.size()));
   return LeavesLess(a, b, kMuch, kMuchOfNumber * static_cast<double>(more));
 }
 
@@ -141,7 +140,7 @@ bool Readings::Reopen(const std::vector<NonlinearFault>& faults) {
 
 RecordingJudgement Readings::Judge(const std::vector<NonlinearFault>& faults,
                                    const Refinements& refinements) {
-  RecordingJudgement judgement = judge_(Correct(model_, faults), refinements, count_);
+  RecordingJudgement judgement = judge_(Correct(model_, faults), refinements, !faults.empty(), count_);
   for (const NonlinearFault& fault : faults) judgement.undone += fault.CountNumbers();
   return judgement;
 }

@@ -16,9 +16,9 @@ Explanation MakeCause(const Fault& fault);
 class Readings {
  public:
   using OnRows = std::function<bool(long rows)>;
-  /// Judges the recordings, which are open, by this model.
-  using JudgeOnce =
-      std::function<RecordingJudgement(const RobotModel&, const Refinements&, const OnRows& on_rows)>;
+  /// Judges the recordings, which are open, by this model, beside faults that were undone.
+  using JudgeOnce = std::function<RecordingJudgement(const RobotModel&, const Refinements&, bool has_others,
+                                                     const OnRows&)>;
 
   /// A judgement beside faults that were undone.
   struct Reading {

@@ -15,6 +15,23 @@ double FindCutOff(const Refinements& refinements, int joint, int component, doub
   return known != refinements.limits.end() ? known->second : kFractions[component / 2] * most;
 }
 
+NonlinearFault GeometryFault(const RobotModel& model, int joint, int component,
+                             const Eigen::Ref<const VectorXd>& amplitude) {
+  using enum NonlinearFault::Number;
+  NonlinearFault fault{.number = component < 3   ? kPlacement
+                                 : component < 5 ? kOrientation
+                                                 : kAxis,
+                       .joint = joint};
+  if (component < 3) {
+    fault.shift.segment(component, amplitude.size()) = amplitude;
+  } else {
+    fault.turn = FindDirections(model, joint).middleCols((component - 3) % 2, amplitude.size()) * amplitude;
+  }
+  return fault;
+}
+
+constexpr double kDisplaced = 1e-6;  // m, rad
+
 TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& joints, bool has_currents,
                              const Refinements& refinements)
     : model_(&model),
@@ -34,6 +51,14 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   late_.resize(n);
   q_.resize(n);
   residual_ = VectorXd::Zero(static_cast<Index>(joints.size()));
+  for (int k = 0; k < kGeometries * n && n <= kMostWithGeometry; ++k) {
+    RobotSpec spec = model.spec();
+    GeometryFault(model, k / kGeometries, k % kGeometries, VectorXd::Constant(1, kDisplaced)).Undo(&spec);
+    Displaced& one = displaced_.emplace_back();
+    one.model = std::make_unique<RobotModel>(std::move(spec));
+    one.regressor = std::make_unique<TorqueRegressor>(*one.model);
+  }
+  geometry_.resize(n, static_cast<Index>(displaced_.size()));
   constexpr double kStep = 1e-6;
   steps_ = VectorXd::Constant(n, kStep);
   for (const auto& [joint, offset] : refinements.offsets) steps_[joint] = -offset;
@@ -62,6 +87,8 @@ void TorqueBalance::ListColumns(bool has_currents) {
     for (int other = 0; other < model_->num_joints(); ++other) {
       columns.push_back({TorqueColumn::kLatePosition, other});
       columns.push_back({TorqueColumn::kPositionGain, other});
+      for (int k = 0; k < kGeometries && !displaced_.empty(); ++k)
+        columns.push_back({TorqueColumn::kGeometry, other, k});
       for (int k = 0; k < kTurns; ++k) columns.push_back({TorqueColumn::kTurn, other, k});
     }
     for (int k = 0; k < 2 * kCutOffs; ++k) columns.push_back({TorqueColumn::kCutOff, joint, k});
@@ -115,6 +142,8 @@ double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const Rec
       return along_(joint, kAlong * column.index);
     case TorqueColumn::kLatePosition:
       return along_(joint, kAlong * column.index + 1);
+    case TorqueColumn::kGeometry:
+      return geometry_(joint, kGeometries * column.index + column.component);
     case TorqueColumn::kPositionGain:
       return along_(joint, kAlong * column.index + 2);
     case TorqueColumn::kTurn:
@@ -214,6 +243,12 @@ Vector3d TorqueBalance::CalcMotionChange(int joint, int k, const RecordedSample&
 
 void TorqueBalance::CalcMotionColumns(const RecordedSample& sample) {
   constexpr double kStep = 1e-6;
+  for (size_t k = 0; k < displaced_.size(); ++k) {
+    auto column = geometry_.col(static_cast<Index>(k));
+    displaced_[k].regressor->SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
+    displaced_[k].regressor->CalcTorques(column);
+    column = ((column - torques_) / kDisplaced).eval();
+  }
   // The torques and their derivatives by time.
   constexpr double kTime = 1e-3;  // s
   VectorXd q, qd, qdd;

@@ -8,11 +8,13 @@
 // samples.
 
 #include <map>
+#include <memory>
 #include <tuple>
 #include <vector>
 
 #include "controller/dynamics/torque_regressor.h"
 #include "harness/recordings/motion_fit.h"
+#include "harness/recordings/nonlinear_faults.h"
 
 namespace dexcheck {
 
@@ -25,6 +27,7 @@ struct TorqueColumn {
     kBacklash,      ///< The same, with the sign of that joint's torque.
     kElastic,       ///< By its position's yielding to the torque of joint index, with its derivatives.
     kLatePosition,  ///< By a delay of the position of joint index, with its derivatives.
+    kGeometry,      ///< By where joint index stands and how it is turned: GeometryFault's numbers.
     kPositionGain,  ///< By the logarithm of the gain of joint index's position.
     kTurn,  ///< By its error along a turn, with its derivatives: sine and cosine of once, then twice a turn.
     kCutOff,   ///< By component: 2 of each torque at which it may have been cut off.
@@ -55,6 +58,14 @@ struct TorqueColumn {
 /// Torques at which a recorded torque may have been cut off (the first), or a motor's, which was less than
 /// recorded: what is beyond, and by the logarithm of the limit.
 inline constexpr int kCutOffs = 3;
+/// Components of kGeometry: three of a placement, then two each of an orientation and an axis.
+inline constexpr int kGeometries = 7;
+/// Returns a joint's fault of geometry whose amplitudes are these, from a component on.
+NonlinearFault GeometryFault(const RobotModel& model, int joint, int component,
+                             const Eigen::Ref<const VectorXd>& amplitude);
+/// Robots of more joints have no kGeometry: their regression would be too wide.
+inline constexpr int kMostWithGeometry = 12;
+
 /// Components of kTurn.
 inline constexpr int kTurns = 4;
 /// Such a torque, as far as is known. @param component of kCutOff. @param most that was recorded.
@@ -141,6 +152,13 @@ class TorqueBalance {
   double block_samples_ = 1.0;
   // at the sample
   MatrixXd bodies_, gravity_, forces_, by_position_, shaking_;
+  /// A model with each of kGeometry's numbers in turn, and its torques.
+  struct Displaced {
+    std::unique_ptr<RobotModel> model;
+    std::unique_ptr<TorqueRegressor> regressor;
+  };
+  std::vector<Displaced> displaced_;
+  MatrixXd geometry_;         // n x displaced_
   MatrixXd torques_in_time_;  // n x 3: the model's, and their derivatives
   MatrixXd along_;            // n x kAlong n: kElastic, kLatePosition, kPositionGain, kTurn of each joint
   std::vector<WrenchPlace> wrenches_;

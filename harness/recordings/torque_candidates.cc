@@ -58,6 +58,8 @@ class FaultList {
 
   std::vector<TorqueFault> Make() {
     for (const int joint : joints_) AddJoint(joint);
+    for (int joint = 0; joint < model_.num_joints() && model_.num_joints() <= kMostWithGeometry; ++joint)
+      AddGeometry(joint);
     for (int link = 0; link < model_.num_joints(); ++link) AddLink(link);
     AddAll();
     for (TorqueFault& one : faults_) {
@@ -198,6 +200,22 @@ class FaultList {
       turn.is_possible = IsNoLonger(kMostError, VectorXd::Zero(harmonics));
       turn.is_ordinary = harmonics == 2;
     }
+  }
+
+  /// All that a fixed base carries turns with gravity.
+  void AddGeometry(int joint) {
+    const auto add = [&](const std::string& fault, const std::string& unit, int first, int count,
+                         double most) {
+      TorqueFault& one =
+          Add(TorqueFault::kGeometry, joint, fault, "joint " + model_.joint(joint).name, unit, {});
+      for (int k = first; k < first + count; ++k) one.sums.push_back({{{TorqueColumn::kGeometry, joint, k}}});
+      one.is_possible = IsNoLonger(most, VectorXd::Zero(count));
+    };
+    constexpr double kFarthest = 0.3, kMostTurn = 0.5;  // m, rad
+    add("axis", "rad", 5, 2, kMostTurn);
+    if (model_.joint(joint).parent < 0) return;
+    add("placement", "m", 0, 3, kFarthest);
+    add("orientation", "rad", 3, 2, kMostTurn);
   }
 
   /// Adds friction whose velocity is roughly known: the shape there, and what the logarithm of the velocity

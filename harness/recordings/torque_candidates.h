@@ -59,6 +59,7 @@ struct TorqueFault : Candidate {
     kEccentricity,
     kLatePosition,
     kPositionGain,
+    kGeometry,
     kSaturation,
     kBacklash,
     kElasticity,
