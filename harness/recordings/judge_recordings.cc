@@ -286,16 +286,8 @@ class Judge {
     if (term.amplitude.head(sizes).norm() < kErrors * shown.head(sizes).norm()) return true;
     // Noise is known to a factor of two: beside another cause, less may be what that one leaves.
     if ((has_others_ || !result_.found.empty()) && IsNoiseWithout(term)) return true;
-    // So is the inertia of a payload, which has one besides its mass and place.
-    const auto is_of_payload = [&](size_t candidate) {
-      const TorqueFault& one = estimator_.faults()[candidate];
-      return one.kind == TorqueFault::kInertia &&
-             std::ranges::any_of(result_.found, [&](const FoundFault& before) {
-               return before.fault.kind == TorqueFault::kPayload && before.fault.index == one.index;
-             });
-    };
-    if (is_of_payload(term.candidate) ||
-        std::ranges::any_of(term.same, [&](const auto& one) { return is_of_payload(one.first); }))
+    if (IsRemainder(term.candidate) ||
+        std::ranges::any_of(term.same, [this](const auto& one) { return IsRemainder(one.first); }))
       return true;
     if (result_.IsWhole()) return false;
     // A payload is named by its mass and place, and has an inertia besides.
@@ -324,6 +316,17 @@ class Judge {
            (result_.left > kFar && fault.kind != TorqueFault::kPayload && term.fraction <= kMost * left);
   }
 
+  /// Whether a fault may be what another one leaves that was found before: a payload has an inertia besides
+  /// its mass and place, and a large error of a joint's position is not in proportion to its columns.
+  [[nodiscard]] bool IsRemainder(size_t candidate) const {
+    const TorqueFault& one = estimator_.faults()[candidate];
+    return std::ranges::any_of(result_.found, [&](const FoundFault& before) {
+      const bool is_of_payload =
+          before.fault.kind == TorqueFault::kPayload && one.kind == TorqueFault::kInertia;
+      return before.fault.index == one.index &&
+             (is_of_payload || (before.fault.IsOfPosition() && one.IsOfPosition()));
+    });
+  }
   /// Whether the other causes leave no more than noise.
   [[nodiscard]] bool IsNoiseWithout(const CauseTerm& term) const {
     std::vector<CauseTerm> others = estimator_.selection().terms;

@@ -330,14 +330,15 @@ void MotionFit::CalcSpeeds() {
   }
   const VectorXd speeds = (squares / std::max(1.0, count)).cwiseSqrt();
   shape_velocities_ = ListShapeVelocities(speeds, refinements_.stribeck, refinements_.smooth);
-  // A joint that moves far does so at few times where joints move one after another.
+  // A joint that friction holds moves far at few times where joints move one after another.
   constexpr double kSlow = 2e-3, kMoving = 0.2, kMovingFar = 0.02, kFar = 0.02;
   constexpr double kHeld = 2e-3;  // rad or m, that a joint gives under its friction
   noise_.rest = noise_.rest.cwiseMax(kSlow * speeds);
   for (int joint = 0; joint < n; ++joint) {
     const double least = model_->joint(joint).dry_friction > 0.0 ? kHeld : 0.0;
     const double span = highest[joint] - lowest[joint];
-    moves_.push_back(moving[joint] > (span > kFar ? kMovingFar : kMoving) * count && span > least);
+    const bool moves_far = least > 0.0 && span > kFar;
+    moves_.push_back(moving[joint] > (moves_far ? kMovingFar : kMoving) * count && span > least);
   }
 }
 

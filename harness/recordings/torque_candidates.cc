@@ -211,7 +211,8 @@ class FaultList {
       for (int k = first; k < first + count; ++k) one.sums.push_back({{{TorqueColumn::kGeometry, joint, k}}});
       one.is_possible = IsNoLonger(most, VectorXd::Zero(count));
     };
-    constexpr double kFarthest = 0.3, kMostTurn = 0.5;  // m, rad
+    // What is larger is not in proportion.
+    constexpr double kFarthest = 0.05, kMostTurn = 0.15;  // m, rad
     add("axis", "rad", 5, 2, kMostTurn);
     if (model_.joint(joint).parent < 0) return;
     add("placement", "m", 0, 3, kFarthest);

@@ -85,6 +85,8 @@ struct TorqueFault : Candidate {
   [[nodiscard]] bool HasVelocity() const {
     return kind == kStribeckFriction || (kind == kDryFriction && sums.size() == 2);
   }
+  /// An error of a joint's measured position.
+  [[nodiscard]] bool IsOfPosition() const { return kind >= kZero && kind <= kPositionGain; }
   /// A fault of bodies, gravity, positions or springs: all but the drive's own numbers.
   [[nodiscard]] bool IsOfLoad() const { return kind == kSpring || (kind >= kZero && kind <= kGravity); }
 };

@@ -290,16 +290,6 @@ bool TorqueEstimator::ExcludeSeconds() {
         std::ranges::min_element(payloads, {}, [](const CauseTerm* one) { return one->amplitude[0]; });
     excluded_[(*least)->candidate] = has_any = true;
   }
-  // A number of all joints besides one of nearly each says nothing.
-  for (const CauseTerm& term : selection_.terms) {
-    const TorqueFault& all = faults_[term.candidate];
-    if (all.index >= 0 || all.sums.size() != 1) continue;
-    const auto own = std::ranges::count_if(selection_.terms, [&](const CauseTerm& one) {
-      return faults_[one.candidate].kind == all.kind && faults_[one.candidate].index >= 0;
-    });
-    if (own > 0 && own + 1 >= std::ssize(recordings_->ListJudged()))
-      excluded_[term.candidate] = has_any = true;
-  }
   std::vector<std::tuple<TorqueFault::Kind, int, int>> seen;
   for (const CauseTerm& term : selection_.terms) {
     const TorqueFault& one = faults_[term.candidate];

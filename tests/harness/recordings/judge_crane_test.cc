@@ -208,7 +208,7 @@ TEST(JudgeCrane, WrongPositionsClocksAndGeometryAreNamed) {
       {"orientation", "joint fold", 0.1, {}, turn},
       {"placement", "joint fold", 0.005, {}, [](Joint* joint) { joint->X_PB.translation().x() += 0.005; }},
       {"stuck torque", "joint fold", kAny, stuck},
-      {"eccentric encoder", "joint fold", 0.02, eccentric},
+      {"eccentric encoder", "joint fold", 0.02, eccentric, nullptr, 0.1},
       {"delay of the position", "joint fold", 6.0 * kStep, late},
       {"dry friction that changes with time", "joint lift", -0.03, warms},
       {"saturation", "joint fold", 1.0, clipped},
