@@ -79,8 +79,9 @@ bool LeavesLess(const RecordingJudgement& one, const RecordingJudgement& other, 
                 double of_all) {
   double most = 0.0, all = 0.0;
   for (size_t i = 0; i < std::min(one.balances.size(), other.balances.size()); ++i) {
-    const auto left = [i](const RecordingJudgement& of) {
-      return std::max({of.balances[i].left, of.balances[i].noise, std::numeric_limits<double>::min()});
+    const double noise = std::max(one.balances[i].noise, other.balances[i].noise);
+    const auto left = [&](const RecordingJudgement& of) {
+      return std::max({of.balances[i].left, noise, std::numeric_limits<double>::min()});
     };
     const double fall = std::log(left(other) / left(one));
     most = std::max(most, fall);
