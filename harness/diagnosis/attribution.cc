@@ -102,7 +102,7 @@ std::vector<Entry> ListFaults(const Causes& causes, std::span<const CheckRecord>
 }
 
 /// Adds one fact of each cause that no fault explains; of two checks of one fact the sharper one states it.
-/// Where a link or wheel is elsewhere, so are its contacts.
+/// Contacts of a link or wheel that is elsewhere are elsewhere, too.
 void AddFacts(std::span<const CheckRecord> steps, std::vector<Entry>* entries) {
   const double void_from = FindVoid(steps);
   const bool is_misplaced = std::ranges::any_of(

@@ -96,7 +96,15 @@ Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions&
   // The law is judged at contacts that are elsewhere, too.
   if (!store.has_misplaced_link() || store.setup().fingertips().empty()) add(ExplainLaw, store);
   add(ExplainContacts, store);
-  if (store.misplaced().empty()) add(ExplainRolling, store.GetBefore(void_from));
+  add(ExplainRolling, store.GetBefore(void_from));
+  // A wheel of another size stands higher or lower, too.
+  const auto rolls_otherwise = [](const Explanation& one) {
+    return one.channel == CauseChannel::kRolling && one.outcome != CauseOutcome::kNotExplained;
+  };
+  if (std::ranges::any_of(causes, rolls_otherwise))
+    std::erase_if(causes, [](const Explanation& one) {
+      return one.channel == CauseChannel::kGeometry && one.faults.front().place.starts_with("wheel ");
+    });
   if (!store.has_misplaced_link()) add(ExplainForces, store);
   if (stopped != nullptr) *stopped = limit.has_ended();
   DropImpossible(store, &causes);

@@ -215,7 +215,7 @@ Push FindTimes(const RecordingSet& recordings, const TorqueRows& rows, const Vec
   constexpr double kBeside = 0.5;  // s: what is held out may hide an end
   const std::vector<TorqueBalance::Block>& all =
       recordings[static_cast<size_t>(push.recording)].fit->blocks();
-  // What is missing to a stuck torque passes through zero, so that it stands out for a part of the time.
+  // The rest of a stuck torque passes through zero, so that it stands out for a part of the time.
   const double beside = push.is_stuck ? all.back().to - all.front().from : push.reach + kBeside;
   for (const TorqueRows::Part& part : rows.parts) {
     if (part.recording != static_cast<size_t>(push.recording)) continue;

@@ -297,7 +297,7 @@ class Judge {
     constexpr double kMostLeft = 0.1;
     // A force on a link for a while fits a part of anything that is large then.
     if (fault.kind == TorqueFault::kPush && fault.push.joint < 0) return true;
-    // What another cause leaves is not told as friction, nor what one that is no friction explains as well.
+    // Friction is no name for a remainder of another cause, nor for a residual that one explains as well.
     const bool is_nearest = !has_others_ && std::ranges::all_of(result_.found, [](const FoundFault& before) {
       return before.is_named && before.fault.IsFriction();
     });

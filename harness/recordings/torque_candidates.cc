@@ -211,7 +211,7 @@ class FaultList {
       for (int k = first; k < first + count; ++k) one.sums.push_back({{{TorqueColumn::kGeometry, joint, k}}});
       one.is_possible = IsNoLonger(most, VectorXd::Zero(count));
     };
-    // What is larger is not in proportion.
+    // Larger displacements are not in proportion.
     constexpr double kFarthest = 0.05, kMostTurn = 0.15;  // m, rad
     add("axis", "rad", 5, 2, kMostTurn);
     if (model_.joint(joint).parent < 0) return;
