@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <string_view>
-#include <utility>
 
 #include "controller/common/text.h"
 #include "harness/checks/check_table.h"
@@ -241,15 +240,7 @@ std::vector<Entry> ListAll(std::span<const CheckRecord> steps, const CheckContex
     const auto any = std::find_if(steps.begin(), steps.end(), [](const CheckRecord& c) { return c.failed; });
     entries.push_back(MakeFact(*any, {.cause = Cause::kUnexplained}));
   }
-  // A force that does not balance follows from no law, motor or sensor, but from what is elsewhere.
-  const bool is_elsewhere = std::ranges::any_of(entries, [](const Entry& entry) {
-    return entry.one.channel == CauseChannel::kGeometry || entry.meaning.cause == Cause::kWheelGeometry;
-  });
-  std::erase_if(entries, [&, first = true](const Entry& entry) mutable {
-    const bool is_first = std::exchange(first, false);
-    const bool is_force = entry.meaning.cause == Cause::kUnmodelledForce && !is_elsewhere;
-    return !is_first && !is_force && Follows(entry);
-  });
+  entries.erase(std::remove_if(entries.begin() + 1, entries.end(), Follows), entries.end());
   if (context.limited && context.limited->failed) {
     const Entry limit = MakeFact(*context.limited, MeaningOf(context.limited->name));
     const bool is_unexplained = entries.front().meaning.cause == Cause::kUnexplained;

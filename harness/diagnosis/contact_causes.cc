@@ -42,6 +42,9 @@ Causes ExplainGeometry(const StepStore& store) {
   constexpr double kRounding = 1e-10;  // m and rad
   Causes causes;
   for (const StepStore::Misplaced& one : store.misplaced()) {
+    // A wheel of another size stands higher or lower, too.
+    const bool is_wheel = one.place.starts_with("wheel ");
+    if (is_wheel && one.offset.head<2>().norm() <= kRounding && one.turn <= kRounding) continue;
     const double offset = one.offset.norm(), turn = RadToDeg(one.turn);
     const std::string on = " on " + one.parent;
     Explanation& cause = causes.emplace_back();

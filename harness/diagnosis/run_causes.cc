@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 
+#include "harness/diagnosis/force_steps.h"
 #include "harness/diagnosis/search_limit.h"
 #include "harness/diagnosis/signal_causes.h"
 
@@ -81,6 +82,18 @@ void DropImpossible(const StepStore& store, Causes* causes) {
   }
 }
 
+/// Adds a balance that does not hold, and that the search had no time for.
+void AddUnsearched(const StepStore& store, Causes* causes) {
+  const auto is_balance = [](const Explanation& one) { return one.channel == CauseChannel::kBalance; };
+  if (store.has_misplaced_link() || std::ranges::any_of(*causes, is_balance)) return;
+  const ForceSteps steps = ListForceSteps(store);
+  if (steps.all.empty()) return;
+  Explanation one{.channel = CauseChannel::kBalance, .outcome = CauseOutcome::kNotExplained};
+  one.from = store.Row(steps.all.front())[0];
+  one.to = store.Row(steps.all.back())[0];
+  causes->push_back(one);
+}
+
 }  // namespace
 
 Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions& options, bool* stopped) {
@@ -106,6 +119,7 @@ Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions&
       return one.channel == CauseChannel::kGeometry && one.faults.front().place.starts_with("wheel ");
     });
   if (!store.has_misplaced_link()) add(ExplainForces, store);
+  if (limit.has_ended()) AddUnsearched(store, &causes);
   if (stopped != nullptr) *stopped = limit.has_ended();
   DropImpossible(store, &causes);
   std::stable_sort(causes.begin(), causes.end(),
