@@ -453,7 +453,8 @@ const CheckInfo* FindCheck(std::string_view name) {
 
 bool HoldsAlways(const CheckRecord& check) {
   const CheckInfo* info = FindCheck(check.name);
-  return info != nullptr && check.kind != CheckCategory::kAssumption && info->meaning.rank != Rank::kResidual;
+  const bool is_expectation = check.kind == kLaw && info != nullptr && info->meaning.rank == Rank::kResidual;
+  return info != nullptr && check.kind != kAssumption && !is_expectation;
 }
 
 }  // namespace dexcheck

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "controller/common/text.h"
+#include "harness/base/ranges.h"
 #include "harness/base/worst.h"
 
 namespace dexcheck {
@@ -95,7 +96,9 @@ const GraspModel& RunChecks::Follow(const StepRecord& step) {
 
 void RunChecks::Reset(Keep keep) {
   for (CheckRecord& record : records_) {
-    if (record.failed && (keep == Keep::kAll || HoldsAlways(record))) settling_failures_.push_back(record);
+    const bool is_kept = record.failed && (keep == Keep::kAll || HoldsAlways(record));
+    if (is_kept && FindIn(settling_failures_, record.name, &CheckRecord::name) == nullptr)
+      settling_failures_.push_back(record);
     record.Reset();
   }
   if (limited_) limited_->Reset();

@@ -183,7 +183,8 @@ class DigitJudge {
     };
     for (const auto& [link, same] : found[0]) {
       const std::vector<ConstantFinding>& placed = found[1][link];
-      const bool is_placed = find_worst(placed, true) < find_worst(same, false);
+      const double worst = find_worst(same, false);
+      const bool is_placed = worst > 1.0 && find_worst(placed, true) < worst;
       for (const ConstantFinding& finding : is_placed ? placed : same) {
         if (!IsWithin(finding, finding.scale, find_open(finding, is_placed)))
           failed_bodies_.insert(finding.check);

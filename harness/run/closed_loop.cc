@@ -16,7 +16,8 @@ double Seconds(Clock::time_point from, Clock::time_point to) {
   return std::chrono::duration<double>(to - from).count();
 }
 
-constexpr double kFindsGrip = 0.1;       // s after the first contact, when assumptions need not hold
+constexpr double kRoughTime = 0.02;      // s after the first contact, when assumptions need not hold,
+constexpr double kFindsGrip = 0.1;       // nor until here, if the grasp lasts longer
 constexpr double kLargestSkew = 1e-2;    // rad between the platform's heading and the way ahead
 constexpr double kSettleMoving = 0.5;    // s
 constexpr double kLargestTilt = 0.2;     // rad, of a robot that still stands
@@ -96,7 +97,7 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration, double end,
                           const std::function<bool()>& should_stop) {
   const double dt = plant_->time_step();
   const long count = std::lround(duration / dt);
-  const long grip = std::lround(kFindsGrip / dt);
+  const long rough = std::lround(kRoughTime / dt), grip = std::lround(kFindsGrip / dt);
   controller_->Follow(motion);
   if (checks_) checks_->FollowMotion(&motion, end - duration);
   ForgetSteps();
@@ -108,7 +109,7 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration, double end,
     if (checks_) checks_->JudgeEffort(record_, t);
     if (checks_) record_.true_model = &checks_->Follow(record_);
     // The first contact is rough; later errors have a cause that the checks should report.
-    if (i == grip) ForgetSteps(RunChecks::Keep::kHoldsAlways);
+    if (i == rough || i == grip) ForgetSteps(RunChecks::Keep::kHoldsAlways);
     if (checks_) {
       checks_->JudgeSettling(record_);
       store_->Add(record_, checks_->analysis(), checks_->differs());
@@ -147,11 +148,11 @@ bool ClosedLoop::StartMoving(const Vector3d& v, const std::function<bool()>& sho
 
 void ClosedLoop::ForgetSteps(RunChecks::Keep keep) {
   if (!checks_) return;
-  const size_t before = checks_->settling_failures().size();
   checks_->Reset(keep);
-  if (!settling_store_ && std::ranges::any_of(checks_->settling_failures().subspan(before), HoldsAlways))
-    settling_store_ = *store_;
-  store_->Reset();
+  const bool has_failed = std::ranges::any_of(checks_->settling_failures(), HoldsAlways);
+  const bool is_over = keep == RunChecks::Keep::kAll;
+  if (is_over && has_failed && !settling_store_) settling_store_ = *store_;
+  if (is_over || !has_failed) store_->Reset();
 }
 
 void ClosedLoop::ControlStep(double t) {
