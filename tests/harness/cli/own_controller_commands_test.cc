@@ -64,8 +64,7 @@ TEST_F(OwnControllerCommands, AScenarioNamesItAndALogKnowsIt) {
   const std::string same = Expect(0, "compare run copied").out;
   EXPECT_THAT(same, HasSubstr("copy.so"));
   EXPECT_THAT(same, Not(HasSubstr("controller_hash")));
-  std::filesystem::copy_file(JOINT_PD, Path("copy.so"),
-                             std::filesystem::copy_options::overwrite_existing);
+  std::filesystem::copy_file(JOINT_PD, Path("copy.so"), std::filesystem::copy_options::overwrite_existing);
   const ProgramResult changed = Run("run --replay copied --controller ./copy.so");
   EXPECT_EQ(changed.exit_code, 1);
   EXPECT_THAT(changed.err, HasSubstr("is not the file that made the run"));
@@ -122,8 +121,7 @@ TEST_P(OwnLawEverywhere, IsWhereFaultsAreMade) {
                         {"--kinds", "law"}));
 }
 
-INSTANTIATE_TEST_SUITE_P(OwnControllerCommands, OwnLawEverywhere,
-                         ::testing::Values(JOINT_LAW, kNumPyLaw),
+INSTANTIATE_TEST_SUITE_P(OwnControllerCommands, OwnLawEverywhere, ::testing::Values(JOINT_LAW, kNumPyLaw),
                          [](const auto& info) { return info.index == 0 ? "Library" : "NumPy"; });
 
 // In a study what a controller does wrong costs its trial, and no other; its process is of no use any more.

@@ -96,8 +96,7 @@ TEST_P(OwnJointLaw, IsTheLaw) {
 }
 
 INSTANTIATE_TEST_SUITE_P(OwnController, OwnJointLaw,
-                         ::testing::Values(JOINT_LAW,
-                                           SourcePath("/harness/examples/numpy_joint_law.py")),
+                         ::testing::Values(JOINT_LAW, SourcePath("/harness/examples/numpy_joint_law.py")),
                          [](const auto& info) { return info.index == 0 ? "Library" : "NumPy"; });
 
 TEST_F(OwnController, TorquesAreHeldForAControlStep) {
@@ -171,8 +170,8 @@ TEST_F(OwnController, WhatALibraryEndsIsNeverGood) {
                                      {"abort", "ended the program (Aborted)"},
                                      {"overflow", "ended the program (Segmentation fault)"},
                                      {"hang", "did not return in time (0.4 s for a step)"}}) {
-    const ProgramResult result =
-        RunWith(FAULTY_CONTROLLER, "--controller-time-limit 0.4 --no-log", {.environment = {{"FAULT", fault}}});
+    const ProgramResult result = RunWith(FAULTY_CONTROLLER, "--controller-time-limit 0.4 --no-log",
+                                         {.environment = {{"FAULT", fault}}});
     EXPECT_EQ(result.exit_code, 3) << fault << result.out;
     EXPECT_THAT(result.err, HasSubstr("faulty_controller.so")) << fault;
     EXPECT_THAT(result.err, HasSubstr(words)) << fault;
@@ -180,7 +179,8 @@ TEST_F(OwnController, WhatALibraryEndsIsNeverGood) {
     EXPECT_THAT(result.out, Not(HasSubstr("PASS"))) << fault;
   }
   for (const char* fault : {"exit", "text", "beyond"}) {
-    const ProgramResult result = RunWith(FAULTY_C_CONTROLLER, "--no-log", {.environment = {{"FAULT", fault}}});
+    const ProgramResult result =
+        RunWith(FAULTY_C_CONTROLLER, "--no-log", {.environment = {{"FAULT", fault}}});
     EXPECT_EQ(result.exit_code, 3) << fault << result.out;
     EXPECT_THAT(result.out + result.err, HasSubstr("faulty_c_controller.so")) << fault;
   }
