@@ -156,9 +156,11 @@ void Judge(const Setup& setup, const ClosedLoop& loop, const SearchOptions& sear
   if (loop.is_checking()) {
     const std::vector<CheckRecord> steps = ListJudged(loop.checks());
     const bool is_before = steps.size() > loop.checks().motion_checks().size();
+    // A run that ends while everything settles has these steps in its own store.
+    const StepStore* const before = is_before ? loop.settling_store() : nullptr;
     bool stopped = false;
     result->causes =
-        ExplainRun(is_before ? *loop.settling_store() : loop.store(), FindVoid(steps), search, &stopped);
+        ExplainRun(before != nullptr ? *before : loop.store(), FindVoid(steps), search, &stopped);
     result->attribution = Attribute(setup.constants(), loop.checks().model_checks(), steps,
                                     loop.checks().context(), &result->causes);
     if (stopped && result->attribution.cause != Cause::kNone)
