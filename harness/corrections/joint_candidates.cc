@@ -32,6 +32,9 @@ void CandidateSearch::SearchAxis(int link) {
               [axis](PrintedLink* made) { made->joint.axis = axis; });
   };
   if (!joint.states_axis) return offer({Kind::kMissing, SiteKind::kAxis}, 0.5, right.axis);
+  // An axis that the other file does not state shows no convention of this one.
+  const bool is_shown = pair_.b().link(pair_.Partner(link)).joint.states_axis;
+  if (!is_shown) return offer({Kind::kOtherAxis, SiteKind::kAxis}, 25.0, right.axis);
   for (const auto& [fault, axis] : ListAxisEdits(given)) offer(fault, 0.0, axis);
   const bool is_turned = (given + right.axis).norm() <= open;
   const GivenNode& numbers = pair_.given(link);

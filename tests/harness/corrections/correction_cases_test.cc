@@ -192,6 +192,9 @@ TEST(CorrectionCases, OnlyAnAxisThatIsNotStatedIsMissing) {
   const std::string axis = "<axis xyz='0 0 1'/>", turned = "<axis xyz='1 0.1 0'/>";
   const std::string stated = Replace(kUrdf, axis, "<axis xyz='1 0 0'/>");
   EXPECT_THAT(ListIds(CompareUrdfs(stated, Replace(kUrdf, axis, turned))), ElementsAre("number.axis"));
+  const FileCorrections missing = CompareUrdfs(kUrdf, Replace(kUrdf, axis, ""));
+  EXPECT_THAT(ListIds(missing), ElementsAre("axis.missing"));
+  EXPECT_TRUE(missing.items[0].in_second);
   EXPECT_THAT(ListIds(CompareUrdfs(Replace(kUrdf, axis, ""), kUrdf)), ElementsAre("axis.missing"));
 }
 

@@ -148,7 +148,7 @@ const HiddenPlace kHiddenPlaces[] = {
      "axis turned by", 1.0},
 };
 
-// What a link, a wheel or an axis elsewhere does to terms, contacts, forces and rolling is not listed beside
+// Terms, contacts, forces and rolling of a link, a wheel or an axis that is elsewhere are not listed beside
 // it.
 TEST(HiddenGeometry, IsNamedAlone) {
   for (const HiddenPlace& hidden : kHiddenPlaces) {
