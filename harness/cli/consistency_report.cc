@@ -154,6 +154,14 @@ Answer AnswerByTerms(const ConsistencyRequest& request, const Comparison& compar
     answer.causes = differences.rounded;
     return answer;
   }
+  if (comparison.digits && std::ranges::all_of(comparison.digits->excesses,
+                                               [](const auto& excess) { return excess.too_loose > 0.0; })) {
+    answer.sentence = fmt::format(
+        "nothing differs, but the files print too few digits to confirm {} number{} within {:g} %; "
+        "--precision accepts more{}.",
+        differences.real.size(), differences.real.size() == 1 ? "" : "s", request.precision, left_out);
+    return answer;
+  }
   const std::string within =
       comparison.digits ? "agrees within the printed digits (" + DescribeDigits(*comparison.digits) + ")"
                         : "agrees to " + request.DescribeTolerance();

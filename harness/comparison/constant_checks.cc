@@ -121,6 +121,11 @@ constexpr QuantityWords kQuantities[] = {
     {"joint_dry_friction", "dry friction", "N m", "N"},
     {"joint_armature", "armature", "kg m^2", "kg"},
     {"joint_coupling", "coupling", "", "", {"leader", "multiplier", "offset"}},
+    {"motor_limit", "motor's limit", "N m", "N"},
+    {"motor_gain", "motor's gain", "", ""},
+    {"disable_flag", "switched off by <flag>", "", ""},
+    {"enable_flag", "switched on by <flag>", "", ""},
+    {"fluid", "medium", "", ""},
     {"wheel_mass", "mass", "kg", "kg"},
     {"wheel_spin_inertia", "spin inertia", "kg m^2", "kg m^2"}};
 

@@ -104,7 +104,7 @@ class PartReader {
 
   EngineParts Read() {
     AddJoints();
-    EnginePart& fluid = list_.parts.emplace_back(EnginePart{"fluid", "", "robot"});
+    EnginePart& fluid = list_.parts.emplace_back(EnginePart{"fluid", "", ""});
     fluid.numbers = {{"fluid", "density", engine_.opt.density, 0.0},
                      {"fluid", "viscosity", engine_.opt.viscosity, 0.0}};
     for (int i = 0; i < engine_.ntendon; ++i)

@@ -107,21 +107,6 @@ FilePair Complete(const DescriptionFile& first, const DescriptionFile& second, c
   return pair;
 }
 
-/// Notes joints whose actuatorfrcrange, a word of later engines, is not the limit that the other file states.
-void NoteForceRanges(const DescriptionFile& file, const RobotDescription& other, Comparison* comparison) {
-  std::vector<std::string> names;
-  for (size_t i = 0; i < other.joints.size(); ++i) {
-    const auto range = file.force_ranges().find(other.spec.joints[i].name);
-    const std::optional<StatedForces>& forces = other.joints[i].forces;
-    if (forces && range != file.force_ranges().end() && range->second != forces->upper)
-      names.push_back(
-          fmt::format("{}: {:.6g} here, {:.6g} there", range->first, range->second, forces->upper));
-  }
-  if (!names.empty())
-    comparison->without_effect.push_back("actuatorfrcrange of " + file.path().filename().string() + ": " +
-                                         JoinNames(names));
-}
-
 /// Compares motors and wheels with an engine's, and names the changes that compilers of MJCFs made.
 /// @param robots with the names of joints of the second.
 void CompareBesideEngine(const std::array<const DescriptionFile*, 2>& files,
@@ -131,7 +116,6 @@ void CompareBesideEngine(const std::array<const DescriptionFile*, 2>& files,
       constants.findings, [](const ConstantFinding& finding) { return finding.check == "motor_limit"; });
   if (!has_motors) CheckMotorsAndWheels(*robots[0], *robots[1], &constants);
   for (const size_t side : {0U, 1U}) {
-    NoteForceRanges(*files[side], *robots[1 - side], comparison);
     if (files[side]->format() != RobotFormat::kMjcf) continue;
     NameCompiledChanges(ListCompiledChanges(files[side]->document(), *files[side]->CopyEngine()), robots,
                         side, &constants, &comparison->notes);
@@ -219,16 +203,20 @@ void CompareTwo(const DescriptionFile& first, const DescriptionFile& second, con
 
 /// The causes of the differences between two mechanisms.
 std::optional<FileCauses> TryToExplain(const DescriptionFile& a, const DescriptionFile& b,
-                                       const ConsistencyOptions& options, const Comparison& comparison) {
+                                       const ConsistencyOptions& options, Comparison* comparison) {
   const auto is_mechanism = [](const auto& robot) { return robot && IsMechanism(*robot); };
   const bool has_bodies = a.format() == RobotFormat::kBodies || b.format() == RobotFormat::kBodies;
-  if (has_bodies || !options.part.empty() || !is_mechanism(comparison.read_first) ||
-      !is_mechanism(comparison.read_second))
+  if (has_bodies || !options.part.empty() || !is_mechanism(comparison->read_first) ||
+      !is_mechanism(comparison->read_second))
     return std::nullopt;
   PrintedRobot first = ReadPrintedRobot(a);
   PrintedRobot second = ReadPrintedRobot(b);
   LeaveOutUnstated(options.ignore, &first);
   LeaveOutUnstated(options.ignore, &second);
+  const bool are_urdfs = first.format == RobotFormat::kUrdf && second.format == RobotFormat::kUrdf;
+  if (are_urdfs && first.has_motors != second.has_motors)
+    comparison->not_compared.push_back("transmissions: only " + (first.has_motors ? first : second).source +
+                                       " has any");
   return FindCauses(first, second);
 }
 
@@ -318,13 +306,13 @@ Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOption
     if (!comparison.read_first || !comparison.read_second || !options.part.empty()) throw;
     // Names that were exchanged, a joint that one file lacks and a joint of another type make another
     // mechanism of one robot.
-    comparison.causes = TryToExplain(user_first, user_second, options, comparison);
+    comparison.causes = TryToExplain(user_first, user_second, options, &comparison);
     if (!comparison.causes || !IsOneRobot(*comparison.causes, *comparison.read_first)) throw;
     comparison.model.emplace(comparison.read_first->spec);
     comparison.not_compared.push_back(std::string("terms: ") + error.what());
     return comparison;
   }
-  comparison.causes = TryToExplain(user_first, user_second, options, comparison);
+  comparison.causes = TryToExplain(user_first, user_second, options, &comparison);
   if (comparison.causes) AddEffects(comparison.result.constants, &*comparison.causes);
   NoteTermsOfFrames(&comparison);
   return comparison;

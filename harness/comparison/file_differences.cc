@@ -29,8 +29,9 @@ std::string DescribeNumbers(const ConstantFinding& finding, const Comparison& co
 
 /// Returns the check, the place and the numbers of a finding, and its effect.
 std::string DescribeFinding(const ConstantFinding& finding, const Comparison& comparison) {
-  return fmt::format("{}: {}: {}{}{}", finding.check, finding.where, DescribeNumbers(finding, comparison),
-                     finding.effect.empty() ? "" : "; ", finding.effect);
+  return fmt::format("{}: {}: {}{}{}", NameQuantity(finding.check), finding.where,
+                     DescribeNumbers(finding, comparison), finding.effect.empty() ? "" : "; ",
+                     finding.effect);
 }
 
 /// The values of a number that differs, and by how much.
@@ -39,7 +40,7 @@ std::string DescribeValues(const ConstantFinding& excess, const Comparison& comp
   if (!excess.effect.empty()) return text + "; " + excess.effect;
   if (excess.too_loose > 0.0)
     return text + fmt::format("; the printed digits give it to {:.2g} % only", 100.0 * excess.too_loose);
-  if (excess.units >= kExact) return text + "; both numbers are exact";
+  if (excess.units >= kExact) return text;
   return text + fmt::format("; {:.3g} times the printed precision", excess.units);
 }
 
@@ -63,7 +64,7 @@ Differences ListExcesses(const Comparison& comparison) {
     const auto [line, is_new] =
         repeated.emplace(excess.check + (is_left_out ? "" : values), std::pair(lines.size(), 0));
     line->second.second += is_new ? 0 : 1;
-    if (is_new) lines.push_back(excess.check + ": " + excess.where + ": " + values);
+    if (is_new) lines.push_back(NameQuantity(excess.check) + ": " + excess.where + ": " + values);
   }
   for (const auto& [key, line] : repeated) {
     if (line.second > 0) lines[line.first] += fmt::format("; and so at {} more", line.second);

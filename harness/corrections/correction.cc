@@ -218,6 +218,7 @@ std::string DescribeKind(const FileFault& fault) {
 }
 
 std::string NameQuantity(const FileFault& fault) {
+  if (fault.whole && fault.kind == Kind::kUnit) return "lengths";
   if (fault.whole) return IsOfBody(fault.of) ? "body" : "place";
   return std::ranges::find(kSites, fault.of, &SiteWords::kind)->id;
 }
@@ -241,6 +242,8 @@ std::string DescribeFault(const FileFault& fault) {
   std::string what = NameSite(fault.of);
   if (fault.kind >= Kind::kClassicRows) {
     what = fault.kind == Kind::kShiftedBodies ? "inertials" : "rows";
+  } else if (fault.whole && fault.kind == Kind::kUnit) {
+    what = "all lengths";
   } else if (fault.whole) {
     what = IsOfBody(fault.of) ? "inertial" : "origin";
   }

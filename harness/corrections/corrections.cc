@@ -75,10 +75,10 @@ class OneWay {
          MatchBy by = MatchBy::kLinks)
       : pair_(a, b, by), is_second_(is_second), budget_(budget) {}
 
-  /// Counts the sites that differ with the cheapest frames.
-  size_t CountSites() {
+  /// The sites that differ with the cheapest frames.
+  std::vector<Site> ListSites() {
     pair_.SetFrames(ChooseFrames(pair_)[0].X_ab);
-    return pair_.ListSites().size();
+    return pair_.ListSites();
   }
 
   FileCorrections Run() {
@@ -408,10 +408,10 @@ void TryReadings(const PrintedRobot& a, const PrintedRobot& b, bool of_second, i
                  FileCorrections* found) {
   constexpr double kReading = 10.0;
   constexpr double kClearer = 20.0;
-  const size_t sites = OneWay(a, b, false, budget).CountSites();
+  const std::vector<Site> sites = OneWay(a, b, false, budget).ListSites();
   for (const WholeReading& reading : ListWholeReadings(of_second ? b : a)) {
     OneWay way(of_second ? a : reading.robot, of_second ? reading.robot : b, false, budget);
-    if (2 * way.CountSites() > sites) continue;
+    if (2 * way.ListSites().size() > sites.size()) continue;
     FileCorrections read = way.Run();
     if (read.bits + kReading + kClearer >= found->bits) continue;
     CorrectionItem item;
@@ -420,6 +420,7 @@ void TryReadings(const PrintedRobot& a, const PrintedRobot& b, bool of_second, i
     item.id = NameFault(item.fault);
     item.places = {"robot"};
     item.values = {""};
+    item.sites = sites;
     item.bits = kReading;
     item.explained = 1.0;
     read.agrees = false;

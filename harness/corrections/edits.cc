@@ -78,18 +78,22 @@ std::vector<OriginEdit> ListTurns(const PrintedOrigin& origin) {
     edits.push_back({Kind::kEulerSequence, k, 1.0,
                      [k](PrintedOrigin* o) { std::copy_n(kSequences[k], 3, o->sequence.begin()); }});
   }
-  edits.push_back({Kind::kMovingAxes, 0, 0.0, [](PrintedOrigin* o) {
+  // A convention of angles beside a quaternion, and of quaternions beside angles, takes a detour.
+  constexpr double kDetour = 2.0;
+  const bool has_quaternion = origin.form == RotationForm::kQuaternion;
+  const double of_angles = has_quaternion ? kDetour : 0.0;
+  edits.push_back({Kind::kMovingAxes, 0, of_angles, [](PrintedOrigin* o) {
                      const bool is_printed = o->form == RotationForm::kRollPitchYaw;
                      const Vector3d rpy =
                          is_printed ? Vector3d(o->r.head<3>()) : SolveRollPitchYaw(o->CalcRotation())[0];
                      o->SetRotation(TurnMoving(rpy));
                    }});
-  turn(Kind::kFixedAxes, 0.0, 0,
+  turn(Kind::kFixedAxes, of_angles, 0,
        [](const Matrix3d& R) { return TurnRollPitchYaw(-SolveRollPitchYaw(R.transpose())[0]); });
   turn(Kind::kTransposed, 0.0, 0, [](const Matrix3d& R) { return Matrix3d(R.transpose()); });
   for (const bool first : {true, false}) {
-    const double indirect = origin.form == RotationForm::kQuaternion ? 0.0 : 2.0;
-    edits.push_back({first ? Kind::kScalarFirst : Kind::kScalarLast, 0, indirect, [first](PrintedOrigin* o) {
+    edits.push_back({first ? Kind::kScalarFirst : Kind::kScalarLast, 0, has_quaternion ? 0.0 : kDetour,
+                     [first](PrintedOrigin* o) {
                        const bool is_printed = o->form == RotationForm::kQuaternion;
                        const Vector4d q = is_printed ? o->r : ToQuaternion(o->CalcRotation());
                        o->SetRotation(TurnQuaternion(first ? Vector4d(q[3], q[0], q[1], q[2])

@@ -249,9 +249,10 @@ void PrintedPair::ListJointSites(int link, std::vector<Site>* sites) const {
   if (ours.kind != JointKind::kSlide) {
     constexpr double kSame = 2e-6;  // m
     Vector3d apart = ours.anchor - right.anchor;
-    if (has_axis) apart -= right.axis * right.axis.dot(apart);
-    if (!(apart.norm() <=
-          kSame + right.anchor_tolerance + given_[static_cast<size_t>(link)].pose.length.norm()))
+    const double along = has_axis ? right.axis.dot(apart) : 0.0;  // each point of an axis stands for it
+    apart -= along * right.axis;
+    if (!(apart.norm() <= kSame + right.anchor_tolerance + std::abs(along) * open +
+                              given_[static_cast<size_t>(link)].pose.length.norm()))
       add(SiteKind::kAxisPoint);
   }
   const auto limits = [](const PrintedRobot& robot) {

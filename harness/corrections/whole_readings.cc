@@ -1,6 +1,7 @@
 #include "harness/corrections/whole_readings.h"
 
 #include <algorithm>
+#include <span>
 
 namespace dexcheck {
 namespace {
@@ -74,6 +75,22 @@ PrintedRobot ReadModified(PrintedRobot robot) {
   return robot;
 }
 
+/// Places and centres of mass in another unit.
+PrintedRobot ScaleLengths(PrintedRobot robot, double factor) {
+  const auto scale = [&](PrintedOrigin* origin) {
+    origin->t *= factor;
+    origin->half_t *= factor;
+    origin->X_before.translation() *= factor;
+  };
+  for (PrintedLink& link : robot.links) {
+    scale(&link.origin);
+    link.joint.anchor *= factor;
+    if (link.as_modified) scale(&*link.as_modified);
+    if (link.inertial) scale(&link.inertial->origin);
+  }
+  return robot;
+}
+
 }  // namespace
 
 std::vector<WholeReading> ListWholeReadings(const PrintedRobot& robot) {
@@ -95,6 +112,12 @@ std::vector<WholeReading> ListWholeReadings(const PrintedRobot& robot) {
   }
   if (std::ranges::any_of(robot.links, [](const PrintedLink& link) { return link.as_modified.has_value(); }))
     readings.push_back({{CorrectionKind::kClassicRows, SiteKind::kPosition, 1}, ReadModified(robot)});
+  const std::span<const UnitFault> units = ListUnits(SiteKind::kPosition);
+  for (size_t k = 0; k < units.size(); ++k) {
+    FileFault fault{CorrectionKind::kUnit, SiteKind::kPosition, static_cast<int>(k)};
+    fault.whole = true;
+    readings.push_back({fault, ScaleLengths(robot, units[k].factor)});
+  }
   std::vector<int> bodies;
   for (int i = 0; i < robot.size(); ++i) {
     if (robot.link(i).inertial && robot.link(i).parent >= 0) bodies.push_back(i);

@@ -14,7 +14,7 @@ struct WholeReading {
 };
 
 /// Lists rows of Denavit-Hartenberg parameters read by the other convention, or with alpha and a of their
-/// neighbours, and bodies that are shifted by one in their list.
+/// neighbours, all lengths in another unit, and bodies that are shifted by one in their list.
 std::vector<WholeReading> ListWholeReadings(const PrintedRobot& robot);
 
 }  // namespace dexcheck

@@ -1,5 +1,6 @@
 #include "harness/descriptions/urdf_file.h"
 
+#include <fmt/format.h>
 #include <urdf_model/pose.h>
 #include <urdf_model/utils.h>
 
@@ -87,11 +88,24 @@ void UrdfFile::Fail(int line, const std::string& problem) const {
 
 std::string UrdfFile::Print() const { return PrintXml(*document_); }
 
+void UrdfFile::RejectDoubles(const Element* element, const std::string& key,
+                             std::initializer_list<const char*> names) const {
+  for (const char* const name : names) {
+    const std::vector<const Element*> found = ListChildren(element, name);
+    if (found.size() > 1)
+      Fail(found[1]->GetLineNum(),
+           fmt::format("{}{}: stated twice, first on line {}", key, name, found[0]->GetLineNum()));
+  }
+}
+
 void UrdfFile::AddLink(Element* element) {
   const int line = element->GetLineNum();
   const std::string name = ReadAttribute(*element, "name");
   if (name.empty()) Fail(line, "link: must have a name");
   const std::string key = "link " + Quote(name) + ": ";
+  RejectDoubles(element, key, {"inertial"});
+  for (const Element* const inertial : ListChildren(element, "inertial"))
+    RejectDoubles(inertial, key + "inertial: ", {"origin", "mass", "inertia"});
   if (const UrdfLink* const other = FindIn(links_, name, &UrdfLink::name))
     Fail(line, key + "names must be unique, taken on line " + std::to_string(other->line));
   if (links_.size() == kMaxLinks)
@@ -104,6 +118,7 @@ void UrdfFile::AddJoint(Element* element) {
                   ReadAttribute(*element, "type")};
   if (joint.name.empty()) joint.name = "#" + std::to_string(joints_.size());
   const std::string key = "joint " + Quote(joint.name) + ": ";
+  RejectDoubles(element, key, {"parent", "child", "origin", "axis", "limit", "dynamics", "mimic"});
   if (Contains(joints_, joint.name, &UrdfJoint::name)) Fail(joint.line, key + "names must be unique");
   if (joints_.size() == kMaxLinks)
     Fail(joint.line, key + "a robot must have at most " + std::to_string(kMaxLinks) + " joints, got more");

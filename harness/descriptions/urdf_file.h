@@ -3,6 +3,7 @@
 // A URDF as an XML document: its links and joints as a tree, each with its element, and their numbers.
 
 #include <filesystem>
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -81,6 +82,9 @@ class UrdfFile {
  private:
   /// Volume and box of a primitive shape; a mesh has no volume here.
   [[nodiscard]] DescribedShape ReadShape(const tinyxml2::XMLElement& use) const;
+  /// @throws InputError for an element of which there is more than one: readers of URDFs take the first.
+  void RejectDoubles(const tinyxml2::XMLElement* element, const std::string& key,
+                     std::initializer_list<const char*> names) const;
   void AddLink(tinyxml2::XMLElement* element);
   void AddJoint(tinyxml2::XMLElement* element);
   [[nodiscard]] int FindEnd(const UrdfJoint& joint, const char* end) const;

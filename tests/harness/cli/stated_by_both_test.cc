@@ -103,9 +103,9 @@ TEST_F(StatedByBoth, LimitsOfMotorsAreComparedWhereBothStateThem) {
   }
   // A joint's own limit, which this engine does not know.
   WriteChanged("c.xml", kPair, "name=\"elbow\"", "name=\"elbow\" actuatorfrcrange=\"-0.6 0.6\"");
-  const Json later = Compare(0, "a.urdf", "c.xml");
-  ASSERT_EQ(later.at("without_effect").size(), 1U);
-  EXPECT_EQ(later.at("without_effect")[0], "actuatorfrcrange of c.xml: elbow: 0.6 here, 1 there");
+  const Json later = Compare(1, "a.urdf", "c.xml");
+  ASSERT_EQ(later.at("causes").size(), 1U);
+  EXPECT_EQ(later.at("causes")[0].at("text"), "joint elbow: effort limit differs: 1 here, 0.6 in the other file");
   // Two URDFs.
   WriteChanged("c.urdf", kUrdf, "upper=\"1\" effort=\"1\"", "upper=\"1\" effort=\"1.2\"");
   EXPECT_TRUE(

@@ -193,8 +193,8 @@ TEST_F(TwoMjcfs, MayBothBeWithoutGravitysFlag) {
   const std::string text = R"(gravity="0 0 -9.81"><flag gravity="disable"/></option>)";
   const std::string off = ReplaceOnce(kArm, kGravity, text);
   EXPECT_TRUE(Compare(off, off).result.Agrees());
-  EXPECT_THAT(List(Compare(off, kArm)), HasSubstr("disable_flag: Gravity: 1 in a.xml, 0 in b.xml"));
-  EXPECT_THAT(List(Compare(kArm, off)), HasSubstr("disable_flag: Gravity: 0 in a.xml, 1 in b.xml"));
+  EXPECT_THAT(List(Compare(off, kArm)), HasSubstr("switched off by <flag>: Gravity: 1 in a.xml, 0 in b.xml"));
+  EXPECT_THAT(List(Compare(kArm, off)), HasSubstr("switched off by <flag>: Gravity: 0 in a.xml, 1 in b.xml"));
 }
 
 // A joint of type "free" takes some defaults of joints.
