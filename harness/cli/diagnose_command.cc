@@ -23,7 +23,7 @@ RepairedFile Repair(const ConsistencyRequest& request, const DescriptionFile& fi
   PrintedRobot printed = ReadPrintedRobot(file), reference = ReadPrintedRobot(other);
   for (PrintedRobot* const robot : {&printed, &reference}) LeaveOutUnstated(request.ignore, robot);
   LeaveOutUnshared(&printed, &reference);
-  return WriteRepaired(file, request.urdf, printed, reference, folder);
+  return WriteRepaired(file, printed, reference, folder);
 }
 
 struct DiagnoseRequest : ConsistencyRequest {

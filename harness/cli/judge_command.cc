@@ -108,9 +108,8 @@ Json ToJson(const RobotModel& model, const RecordingJudgement& judgement,
 /// Writes the model's file with what was found. @returns what was corrected, and what was not.
 std::vector<std::string> Correct(const RecordingJudgement& judgement, const JudgeRequest& request,
                                  OutputFile* file) {
-  const CorrectedFile corrected =
-      WriteCorrections(DescriptionFile(request.model, request.urdf), request.urdf, judgement,
-                       std::filesystem::path(request.corrected).parent_path());
+  const CorrectedFile corrected = WriteCorrections(DescriptionFile(request.model, request.urdf), judgement,
+                                                   std::filesystem::path(request.corrected).parent_path());
   file->Write(corrected.text);
   std::vector<std::string> remarks = {fmt::format("{}: {} of {} causes are corrected",
                                                   request.corrected.string(), corrected.written.size(),

@@ -106,7 +106,7 @@ struct QuantityWords {
   const char* name;
   const char* unit;
   const char* prismatic_unit;
-  std::array<const char*, 6> components = {};
+  std::array<const char*, 9> components = {};
 };
 
 constexpr QuantityWords kQuantities[] = {
@@ -126,6 +126,15 @@ constexpr QuantityWords kQuantities[] = {
     {"disable_flag", "switched off by <flag>", "", ""},
     {"enable_flag", "switched on by <flag>", "", ""},
     {"fluid", "medium", "", ""},
+    {"object_mass", "mass", "kg", "kg"},
+    {"object_inertia",
+     "inertia",
+     "kg m^2",
+     "kg m^2",
+     {"Ixx", "Ixy", "Ixz", "Iyx", "Iyy", "Iyz", "Izx", "Izy", "Izz"}},
+    {"wheel_radius", "wheel radius", "m", "m"},
+    {"wheel_distance", "distance of the wheels", "m", "m"},
+    {"axle_position", "place of the axle", "m", "m"},
     {"wheel_mass", "mass", "kg", "kg"},
     {"wheel_spin_inertia", "spin inertia", "kg m^2", "kg m^2"}};
 

@@ -146,9 +146,9 @@ void RaiseTo(double value, double* largest) { *largest = Worst(*largest, value);
 /// Judges numbers of two files by the precision to which both print them.
 class DigitJudge {
  public:
-  DigitJudge(const MovedFile& a, const MovedFile& b, const RobotModel& model, double precision,
-             DigitVerdict* verdict)
-      : a_(a), b_(b), model_(model), precision_(precision), verdict_(*verdict) {}
+  DigitJudge(const MovedFile& a, const MovedFile& b, const RobotModel& model, bool are_mjcfs,
+             double precision, DigitVerdict* verdict)
+      : a_(a), b_(b), model_(model), are_mjcfs_(are_mjcfs), precision_(precision), verdict_(*verdict) {}
 
   /// Keeps the findings that exceed the precision of both files.
   void JudgeConstants(ConstantChecks* constants) {
@@ -228,7 +228,14 @@ class DigitJudge {
   /// The printed precision of both files.
   [[nodiscard]] double FindOpen(const ConstantFinding& finding, bool is_placed = false) const {
     const ConstantKey key = KeyOf(finding, model_.spec());
-    return a_.FindOpen(key, is_placed) + b_.FindOpen(key, is_placed);
+    const double open = a_.FindOpen(key, is_placed) + b_.FindOpen(key, is_placed);
+    return open > 0.0 || !are_mjcfs_ ? open : FindHalf(finding.model) + FindHalf(finding.engine);
+  }
+  /// Half a unit of the last digit of a number that no draw moves, such as a motor's: of at least so many.
+  static double FindHalf(double value) {
+    constexpr int kFewest = 5;
+    const std::optional<PrintedNumber> printed = ReadPrinted(FormatNumber(value, 12));
+    return printed && printed->digits >= kFewest ? printed->half_unit : 0.0;
   }
   static double CalcUnits(const ConstantFinding& finding, double open) {
     return std::abs(finding.model - finding.engine) / open;
@@ -284,6 +291,7 @@ class DigitJudge {
   const MovedFile& a_;
   const MovedFile& b_;
   const RobotModel& model_;
+  bool are_mjcfs_;
   double precision_;
   DigitVerdict& verdict_;
   std::set<std::string> failed_bodies_;
@@ -313,7 +321,9 @@ std::optional<DigitVerdict> JudgeByDigits(const std::array<const DescriptionFile
         FeedRandomStates(model, std::min(kStates, options.samples), options.range, options.seed,
                          comparison.needs_second_velocity()),
         [](long) { return true; }, &comparison);
-    DigitJudge judge(moved_a, moved_b, model, options.precision, &verdict);
+    const bool are_mjcfs = std::ranges::all_of(
+        files, [](const DescriptionFile* file) { return file->format() == RobotFormat::kMjcf; });
+    DigitJudge judge(moved_a, moved_b, model, are_mjcfs, options.precision, &verdict);
     judge.JudgeConstants(&result->constants);
     judge.JudgeBodies();
     judge.JudgeTerms(comparison, &result->terms);

@@ -343,18 +343,34 @@ std::vector<std::string> LeaveOutShared(const std::vector<EnginePart>& first,
   return lines;
 }
 
+void MatchMotors(const std::vector<EnginePart>& first, std::vector<EnginePart>* second) {
+  const auto list_lone = [](const auto& own, const auto& other) {
+    std::multimap<std::vector<std::string>, size_t> lone;  // by what they act on
+    for (size_t i = 0; i < own.size(); ++i) {
+      if (own[i].kind == PartKind::kActuator && FindIn(other, own[i].key, &EnginePart::key) == nullptr)
+        lone.emplace(own[i].acts_on, i);
+    }
+    return lone;
+  };
+  const auto ours = list_lone(first, *second), theirs = list_lone(*second, first);
+  for (const auto& [acts_on, i] : theirs) {
+    if (ours.count(acts_on) == 1 && theirs.count(acts_on) == 1)
+      (*second)[i].key = first[ours.find(acts_on)->second].key;
+  }
+}
+
 namespace {
 
-/// Names of motors of one file that the other one has, too, or has not.
+/// Keys or names of motors of one file that the other one has, too, or has not.
 std::vector<std::string> ListMotors(const std::vector<EnginePart>& own, const std::vector<EnginePart>& other,
-                                    bool is_shared) {
-  std::vector<std::string> names;
+                                    bool is_shared, std::string EnginePart::*word = &EnginePart::name) {
+  std::vector<std::string> words;
   for (const EnginePart& part : own) {
-    if (part.kind == PartKind::kActuator &&
-        (FindIn(other, part.key, &EnginePart::key) != nullptr) == is_shared)
-      names.push_back(part.name.substr(part.name.find(' ') + 1));
+    const bool is_in_other = FindIn(other, part.key, &EnginePart::key) != nullptr;
+    if (part.kind == PartKind::kActuator && is_in_other == is_shared)
+      words.push_back((part.*word).substr((part.*word).find(' ') + 1));
   }
-  return names;
+  return words;
 }
 
 }  // namespace
@@ -375,11 +391,11 @@ std::vector<std::string> ListLoneMotors(const std::vector<EnginePart>& first,
 std::vector<std::string> CompareMotorOrder(const std::vector<EnginePart>& first,
                                            const std::vector<EnginePart>& second,
                                            const std::string& first_file, const std::string& second_file) {
-  const std::vector<std::string> own = ListMotors(first, second, true),
-                                 other = ListMotors(second, first, true);
-  if (own == other) return {};
-  return {fmt::format("order of motors, and of their controls: {} in {}; {} in {}", JoinNames(own),
-                      first_file, JoinNames(other), second_file)};
+  if (ListMotors(first, second, true, &EnginePart::key) == ListMotors(second, first, true, &EnginePart::key))
+    return {};
+  return {fmt::format("order of motors, and of their controls: {} in {}; {} in {}",
+                      JoinNames(ListMotors(first, second, true)), first_file,
+                      JoinNames(ListMotors(second, first, true)), second_file)};
 }
 
 }  // namespace dexcheck

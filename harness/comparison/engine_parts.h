@@ -68,6 +68,10 @@ std::vector<std::string> LeaveOutShared(const std::vector<EnginePart>& first,
                                         const std::vector<EnginePart>& second, const mjModel& first_engine,
                                         mjModel* second_engine);
 
+/// Lets a motor of the second model correspond to one of another name in the first, where each is the only
+/// one there of no partner that acts on the same joint.
+void MatchMotors(const std::vector<EnginePart>& first, std::vector<EnginePart>* second);
+
 /// Names the motors that only one of two files has. @return a line for each file that has such.
 std::vector<std::string> ListLoneMotors(const std::vector<EnginePart>& first,
                                         const std::vector<EnginePart>& second, const std::string& first_file,

@@ -124,17 +124,18 @@ void CompareBesideEngine(const std::array<const DescriptionFile*, 2>& files,
 
 /// Lists the parts that the first of two MJCFs has besides its mechanism, notes what else the two have, and
 /// takes parts that both have out of the second one.
-std::vector<EnginePart> ListFirstParts(const DescriptionFile& first, const EngineParts& parts,
-                                       mjModel* engine, Comparison* comparison) {
+std::vector<EnginePart> ListFirstParts(const DescriptionFile& first, mjModel* engine, EngineParts* parts,
+                                       Comparison* comparison) {
   const MjModelPtr own_engine = first.CopyEngine();
   const RobotModel model(first.Describe().spec);
   EngineParts own = ListEngineParts(Adapter(model, *own_engine, first.path().string()), {false, true});
   const std::string file = first.path().filename(), other = comparison->second.filename();
+  MatchMotors(own.parts, &parts->parts);
   comparison->without_effect = CompareOptions(own_engine->opt, engine->opt, file, other);
-  Append(CompareContacts(own.notes, parts.notes), &comparison->without_effect);
-  Append(CompareMotorOrder(own.parts, parts.parts, file, other), &comparison->without_effect);
-  Append(ListLoneMotors(own.parts, parts.parts, file, other), &comparison->not_compared);
-  Append(LeaveOutShared(own.parts, parts.parts, *own_engine, engine), &comparison->not_compared);
+  Append(CompareContacts(own.notes, parts->notes), &comparison->without_effect);
+  Append(CompareMotorOrder(own.parts, parts->parts, file, other), &comparison->without_effect);
+  Append(ListLoneMotors(own.parts, parts->parts, file, other), &comparison->not_compared);
+  Append(LeaveOutShared(own.parts, parts->parts, *own_engine, engine), &comparison->not_compared);
   return std::move(own.parts);
 }
 
@@ -143,7 +144,7 @@ ConstantChecks CompareEngineConstants(const DescriptionFile& first, const FilePa
                                       const ConsistencyOptions& options, const Adapter& adapter,
                                       mjModel* engine, Comparison* comparison) {
   const std::string file = comparison->second.filename().string();
-  const EngineParts parts = ListEngineParts(
+  EngineParts parts = ListEngineParts(
       adapter, {first.format() == RobotFormat::kUrdf, true, Contains(options.ignore, "coupling")});
   if (!parts.motors.empty())
     comparison->not_compared.push_back("motors: only " + file +
@@ -151,7 +152,7 @@ ConstantChecks CompareEngineConstants(const DescriptionFile& first, const FilePa
                                        "gears): " +
                                        JoinNames(parts.motors));
   FirstFile stated{true, pair.second ? &pair.first : nullptr, options.ignore, file};
-  if (first.format() == RobotFormat::kMjcf) stated.parts = ListFirstParts(first, parts, engine, comparison);
+  if (first.format() == RobotFormat::kMjcf) stated.parts = ListFirstParts(first, engine, &parts, comparison);
   ConstantChecks constants = CheckConstants(adapter, parts, stated);
   Append(constants.not_compared, &comparison->not_compared);
   return constants;

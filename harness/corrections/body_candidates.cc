@@ -148,9 +148,27 @@ void CandidateSearch::SearchBody(int link) {
     return std::ranges::any_of(of.parts, [&](int part) { return robot.link(part).is_from_shapes; });
   };
   constexpr const char* kFromShapes = "MuJoCo computed it from the shapes";
-  if (is_from_shapes(pair_.a(), node)) offer(MakeWhole(Kind::kMissing), kFromShapes, GiveBody(right.body));
-  if (is_from_shapes(pair_.b(), theirs))
+  const bool is_made = is_from_shapes(pair_.a(), node), is_made_b = is_from_shapes(pair_.b(), theirs);
+  if (is_made && is_made_b) {
+    const MassProperties& given = pair_.given(link).body;
+    constexpr double kSame = 1e-6;
+    const double factor = right.body.mass > 0.0 ? given.mass / right.body.mass : 0.0;
+    const bool is_in_proportion = (given.com - right.body.com).norm() <= kSame &&
+                                  given.inertia.isApprox(factor * right.body.inertia, kSame);
+    std::string values = "inertia of the same mass and centre";
+    if (is_in_proportion) {
+      values = fmt::format("all of it {:.6g} times the other file's", factor);
+    } else if (std::abs(factor - 1.0) > kSame) {
+      values = "mass " + DescribeRight(given.mass, right.body.mass);
+    } else if ((given.com - right.body.com).norm() > kSame) {
+      values = "centre of mass " + DescribeRight(given.com, right.body.com);
+    }
+    offer(MakeWhole(Kind::kShapes), std::move(values), GiveBody(right.body));
+  } else if (is_made) {
+    offer(MakeWhole(Kind::kMissing), kFromShapes, GiveBody(right.body));
+  } else if (is_made_b) {
     offer(MakeWhole(Kind::kMissing, true), kFromShapes, GiveBody(right.body));
+  }
   SearchLostParts(link);
   SearchLoad(link);
   for (const int k : node.parts) {

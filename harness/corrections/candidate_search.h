@@ -72,6 +72,8 @@ class CandidateSearch {
   // place_candidates.cc
   void SearchPlace(int link);
   struct Origin;  ///< One origin of a chain, and what is right of it.
+  /// By how much more the second file's joint has as its reference position, rad or m, and both in words.
+  [[nodiscard]] std::pair<double, std::string> CompareReferences(const Origin& origin) const;
   void SearchRotationNumbers(const Origin& origin);
   void SearchPositionNumbers(const Origin& origin);
   void SearchPoseNumbers(const Origin& origin);

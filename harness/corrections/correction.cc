@@ -156,6 +156,7 @@ constexpr KindWords kWords[] = {
     {Kind::kOfOther, "other_link", "that of"},
     {Kind::kPartMissing, "lost", "without a part that is welded to it"},
     {Kind::kOtherAxis, "number", "differs"},
+    {Kind::kShapes, "shapes", "from shapes of another size, place or density, or with settotalmass"},
     {Kind::kCompiled, "compiled", "as a setting of the compiler made it"},
     {Kind::kClassicRows, "{}", "{}"},
     {Kind::kShiftedRows, "{}", "with alpha and a of the row {}"},

@@ -123,6 +123,7 @@ enum class CorrectionKind {
   kOfOther,
   kPartMissing,
   kOtherAxis,
+  kShapes,    ///< Both files leave it to the engine, which computes it from the shapes.
   kCompiled,  ///< A setting of an MJCF's compiler changed what the text states.
   // All rows of a table, or all bodies of a list.
   kClassicRows,  ///< Component: 1: they are modified ones.

@@ -305,7 +305,10 @@ class OneWay {
         item.values.push_back(candidate.values);
       }
       // A patch of this file would copy the other one's fault.
-      if (!candidate.fault.in_second) Append(candidate.patches, &item.patches);
+      // Numbers that a compiler computes are not written in this place.
+      const bool is_computed = candidate.fault.kind == CorrectionKind::kShapes ||
+                               candidate.fault.kind == CorrectionKind::kCompiled;
+      if (!candidate.fault.in_second && !is_computed) Append(candidate.patches, &item.patches);
     }
     const CorrectionCandidate& first = candidates[deal.candidates[0]];
     item.in_second = is_second_ != item.fault.in_second;

@@ -255,7 +255,9 @@ void CandidateSearch::SearchRobot() {
         return only;
       };
       const std::vector<std::string> lacking = list(b, a), surplus = list(a, b);
-      if (!lacking.empty()) add(Kind::kMissing, 3.0, JoinNames(lacking));
+      if (!lacking.empty() && !surplus.empty())
+        add(Kind::kNumber, 3.0, DescribeRight(JoinNames(surplus), JoinNames(lacking)));
+      if (!lacking.empty() && surplus.empty()) add(Kind::kMissing, 3.0, JoinNames(lacking));
       if (lacking.empty()) add(Kind::kSurplus, 3.0, JoinNames(surplus));
     } else if (site.kind == SiteKind::kGravity) {
       const Vector3d& given = *a.gravity;

@@ -92,6 +92,13 @@ void CandidateSearch::SearchPlace(int link) {
   }
 }
 
+std::pair<double, std::string> CandidateSearch::CompareReferences(const Origin& origin) const {
+  const int partner = pair_.Partner(origin.node);
+  if (!origin.is_last || partner < 0) return {};
+  const double ours = pair_.a().link(origin.node).joint.ref, theirs = pair_.b().link(partner).joint.ref;
+  return {theirs - ours, DescribeRight(fmt::format("ref {:.6g}", ours), fmt::format("{:.6g}", theirs))};
+}
+
 void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
   const Matrix3d given = origin.given.CalcRotation();
   const Matrix3d right = origin.right.linear();
@@ -115,6 +122,9 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
   }
   const PrintedJoint& joint = pair_.a().link(origin.node).joint;
   const Vector3d axis = joint.axis.normalized();
+  const auto [ref, refs] = CompareReferences(origin);
+  if (ref != 0.0 && joint.kind == JointKind::kHinge && (turn + ref * axis).norm() <= half)
+    offer(CorrectionKind::kZero, 0.5, refs);
   if (joint.kind == JointKind::kHinge && origin.is_last) {
     const double across = axis.cross(turn).norm();
     const std::optional<double> left = CountLeft(across / origin.open_angle, angle / origin.open_angle);
@@ -170,6 +180,12 @@ void CandidateSearch::SearchPositionNumbers(const Origin& origin) {
   const double bits = CountEntries(3, t.data(), right.data(), open.data());
   const std::string values = DescribeEntries(kAxisNames, t.data(), right.data(), open.data());
   const auto take = [right](PrintedLink* link) { link->origin.t = right; };
+  const PrintedJoint& joint = pair_.a().link(origin.node).joint;
+  const auto [ref, refs] = CompareReferences(origin);
+  const Vector3d apart = right - t + origin.given.CalcRotation() * joint.axis.normalized() * ref;
+  if (ref != 0.0 && joint.kind == JointKind::kSlide &&
+      (apart.cwiseAbs().array() <= open.array() + 1e-9).all())
+    Try(origin.Make(CorrectionKind::kZero, SiteKind::kPosition, 0.5, refs), origin.link, take);
   if (t.isZero())
     Try(origin.Make(CorrectionKind::kMissing, SiteKind::kPosition,
                     3.0 + (origin.is_last ? 0.0 : 8.0) + 0.25 * (bits + origin.extra), values),

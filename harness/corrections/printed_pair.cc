@@ -255,13 +255,16 @@ void PrintedPair::ListJointSites(int link, std::vector<Site>* sites) const {
                               given_[static_cast<size_t>(link)].pose.length.norm()))
       add(SiteKind::kAxisPoint);
   }
+  // An MJCF's joint without limits has none; other files need not state them.
+  const bool are_mjcfs = a_.format == RobotFormat::kMjcf && b_.format == RobotFormat::kMjcf;
   const auto limits = [](const PrintedRobot& robot) {
     return std::ranges::any_of(robot.links, [](const PrintedLink& l) { return l.joint.range.has_value(); });
   };
   if (ours.range && theirs.range) {
     if (Differ((*ours.range)[0], (*theirs.range)[0]) || Differ((*ours.range)[1], (*theirs.range)[1]))
       add(SiteKind::kRange);
-  } else if (ours.range.has_value() != theirs.range.has_value() && limits(a_) && limits(b_)) {
+  } else if (ours.range.has_value() != theirs.range.has_value() &&
+             (are_mjcfs || (limits(a_) && limits(b_)))) {
     add(SiteKind::kRange);
   }
   ListConstantSites(link, sites);

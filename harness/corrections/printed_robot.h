@@ -96,6 +96,7 @@ struct PrintedJoint {
   std::optional<std::array<PrintedScalar, 2>> range;
   std::array<std::optional<PrintedScalar>, kNumJointScalars> scalars;
   std::optional<PrintedMimic> mimic;
+  double ref = 0.0;  ///< Of an MJCF: its position where its body stands as the file places it.
 };
 
 /// An inertial that a setting of an MJCF's compiler changed.

@@ -1,5 +1,7 @@
 #include "harness/corrections/read_printed.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -375,6 +377,9 @@ PrintedRobot ReadPrintedRobot(const DescriptionFile& file, const DescriptionFile
   } else if (file.format() == RobotFormat::kMjcf) {
     robot = ReadPrintedMjcf(file.document(), *file.CopyEngine());
     LimitEfforts(file.force_ranges(), &robot);
+    for (const std::string& force : file.newer_forces())
+      robot.constraints.push_back(fmt::format("{} {}", kServo, force));
+    std::ranges::sort(robot.constraints);
   } else if (file.format() == RobotFormat::kBodies && carrier != nullptr &&
              carrier->format() != RobotFormat::kBodies) {
     robot = ReadPrintedRobot(*carrier);

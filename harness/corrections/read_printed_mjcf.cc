@@ -182,6 +182,7 @@ class PrintedMjcfReader {
     const std::string axis = find("axis");
     std::tie(joint.axis, joint.half_axis) = ReadPrintedVector<3>(axis.empty() ? "0 0 1" : axis);
     joint.anchor = MapVector(engine_.jnt_pos + 3 * id);
+    if (joint.kind != JointKind::kBall) joint.ref = engine_.qpos0[engine_.jnt_qposadr[id]];
     const double unit = joint.kind == JointKind::kSlide ? 1.0 : unit_;
     if (engine_.jnt_limited[id] != 0 && joint.kind != JointKind::kBall) {
       const auto [range, halves] = ReadPrintedVector<3>(find("range"));
@@ -324,7 +325,8 @@ class PrintedMjcfReader {
       motor.gear = engine_.actuator_gear[6 * i];
       const mjtNum* const bias = engine_.actuator_biasprm + mjNBIAS * i;
       if (engine_.actuator_biastype[i] != mjBIAS_NONE && (bias[1] != 0.0 || bias[2] != 0.0))
-        motor.servo = fmt::format("(kp {:.6g}, kv {:.6g})", 0.0 - bias[1], 0.0 - bias[2]);
+        motor.servo = fmt::format("(kp {:.6g}{})", 0.0 - bias[1],
+                                  bias[2] == 0.0 ? "" : fmt::format(", kv {:.6g}", 0.0 - bias[2]));
       const std::optional<std::pair<double, double>> limits = FindForceLimits(engine_, i);
       if (limits && std::abs(limits->first + limits->second) <= 1e-9 * std::abs(limits->second))
         motor.effort = {std::abs(limits->second), kEngineDigits * std::abs(limits->second)};

@@ -155,7 +155,7 @@ class UrdfRepair final : private RepairWriter {
 class MjcfRepair final : private RepairWriter {
  public:
   MjcfRepair(const DescriptionFile& file, const PrintedRobot& before, const PrintedRobot& after)
-      : RepairWriter(file, kMjcfKeys, before, after), mjcf_(file.document()) {
+      : RepairWriter(file, kMjcfKeys, before, after), mjcf_(file.path(), &file.text()) {
     for (const XmlElement* compiler : ListChildren(mjcf_.root(), "compiler")) {
       if (compiler->Attribute("angle") != nullptr)
         in_degrees_ = ReadAttribute(*compiler, "angle") != "radian";
@@ -235,7 +235,7 @@ class MjcfRepair final : private RepairWriter {
     body->FirstChildElement("inertial")->DeleteAttribute("diaginertia");
   }
 
-  const MjcfFile& mjcf_;
+  MjcfFile mjcf_;  // with the words that this engine does not know
   bool in_degrees_ = true;
   int link_ = 0;
   XmlElement* element_ = nullptr;  // of the joint that is written
@@ -243,7 +243,7 @@ class MjcfRepair final : private RepairWriter {
 
 }  // namespace
 
-RepairedFile WriteRepaired(const DescriptionFile& file, const UrdfOptions& urdf, const PrintedRobot& printed,
+RepairedFile WriteRepaired(const DescriptionFile& file, const PrintedRobot& printed,
                            const PrintedRobot& reference, const std::filesystem::path& folder) {
   if (file.format() == RobotFormat::kBodies)
     throw InputError(file.path().string() + ": cannot be repaired: it is a table of bodies");
@@ -255,16 +255,14 @@ RepairedFile WriteRepaired(const DescriptionFile& file, const UrdfOptions& urdf,
     throw InputError(file.path().filename().string() +
                      ": cannot be repaired: its causes must be corrected by hand");
   repaired.text = file.format() == RobotFormat::kToml ? WriteTable(file, printed, after)
-                                                      : WriteXml(file, urdf, printed, after, folder);
+                                                      : WriteXml(file, printed, after, folder);
   return repaired;
 }
 
-std::string WriteXml(const DescriptionFile& file, const UrdfOptions& urdf, const PrintedRobot& before,
-                     const PrintedRobot& after, const std::filesystem::path& folder) {
+std::string WriteXml(const DescriptionFile& file, const PrintedRobot& before, const PrintedRobot& after,
+                     const std::filesystem::path& folder) {
   if (file.format() == RobotFormat::kUrdf) return UrdfRepair(file, before, after).Write();
-  // Its document is changed.
-  const DescriptionFile copy(file.path(), file.text(), urdf);
-  return MjcfRepair(copy, before, after).Write(folder);
+  return MjcfRepair(file, before, after).Write(folder);
 }
 
 }  // namespace dexcheck

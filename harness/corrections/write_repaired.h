@@ -21,12 +21,12 @@ struct RepairedFile {
 /// @param printed the robot of the file, without what the two files need not share.
 /// @param folder in which the text will stand: an MJCF finds its meshes from there.
 /// @throws InputError "FILE: cannot be repaired: why" for what the file has no attribute or key for.
-RepairedFile WriteRepaired(const DescriptionFile& file, const UrdfOptions& urdf, const PrintedRobot& printed,
+RepairedFile WriteRepaired(const DescriptionFile& file, const PrintedRobot& printed,
                            const PrintedRobot& reference, const std::filesystem::path& folder);
 
 /// Returns the text of `file`, a URDF or an MJCF, with the numbers of `after` where they are not those of
 /// `before`, which it prints. Comments stay. @throws InputError as WriteRepaired.
-std::string WriteXml(const DescriptionFile& file, const UrdfOptions& urdf, const PrintedRobot& before,
-                     const PrintedRobot& after, const std::filesystem::path& folder);
+std::string WriteXml(const DescriptionFile& file, const PrintedRobot& before, const PrintedRobot& after,
+                     const std::filesystem::path& folder);
 
 }  // namespace dexcheck

@@ -288,6 +288,7 @@ DescriptionFile::DescriptionFile(std::filesystem::path path, std::string text, c
     case RobotFormat::kMjcf:
       document_ = std::make_unique<MjcfFile>(path_, &text_);
       force_ranges_ = FindForceRanges(*document_);
+      newer_forces_ = ListNewerForces(*document_);
       engine_ = LoadMjcf(document_.get());
       break;
     case RobotFormat::kToml:

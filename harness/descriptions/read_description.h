@@ -63,6 +63,8 @@ class DescriptionFile {
   /// The largest force that joints of an MJCF allow (actuatorfrcrange), by name, N or N m. Engines before 3.0
   /// do not know it.
   [[nodiscard]] const std::map<std::string, double>& force_ranges() const { return force_ranges_; }
+  /// What it says of actuators' forces in words that this engine does not know (ListNewerForces).
+  [[nodiscard]] const std::vector<std::string>& newer_forces() const { return newer_forces_; }
   /// A copy of the engine's model.
   [[nodiscard]] MjModelPtr CopyEngine() const;
 
@@ -76,6 +78,7 @@ class DescriptionFile {
   std::unique_ptr<MjcfFile> document_;           // of an MJCF
   MjModelPtr engine_;                            // of an MJCF
   std::map<std::string, double> force_ranges_;   // FindForceRanges of an MJCF, which the engine may not know
+  std::vector<std::string> newer_forces_;
 };
 
 /// Reads the robot of one file. @throws InputError as DescriptionFile.

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "harness/diagnosis/force_steps.h"
+#include "harness/diagnosis/model_causes.h"
 #include "harness/diagnosis/search_limit.h"
 #include "harness/diagnosis/signal_causes.h"
 
@@ -104,12 +105,18 @@ Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions&
     Causes found = explain(from);
     std::move(found.begin(), found.end(), std::back_inserter(causes));
   };
+  const Setup& setup = store.setup();
+  const bool has_other_numbers = !setup.constants().findings.empty();
+  if (options.model_fails && !has_other_numbers) causes = ListModelCauses(setup.model(), setup.engine());
+  const bool is_other_model = has_other_numbers || !causes.empty();
   add(ExplainGeometry, store);
   add(ExplainSignals, store);
   // The law is judged at contacts that are elsewhere, too.
-  if (!store.has_misplaced_link() || store.setup().fingertips().empty()) add(ExplainLaw, store);
-  add(ExplainContacts, store);
-  add(ExplainRolling, store.GetBefore(void_from));
+  if (!is_other_model && (!store.has_misplaced_link() || setup.fingertips().empty())) add(ExplainLaw, store);
+  if (!is_other_model) {
+    add(ExplainContacts, store);
+    add(ExplainRolling, store.GetBefore(void_from));
+  }
   // A wheel of another size stands higher or lower, too.
   const auto rolls_otherwise = [](const Explanation& one) {
     return one.channel == CauseChannel::kRolling && one.outcome != CauseOutcome::kNotExplained;
@@ -118,8 +125,8 @@ Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions&
     std::erase_if(causes, [](const Explanation& one) {
       return one.channel == CauseChannel::kGeometry && one.faults.front().place.starts_with("wheel ");
     });
-  if (!store.has_misplaced_link()) add(ExplainForces, store);
-  if (limit.has_ended()) AddUnsearched(store, &causes);
+  if (!is_other_model && !store.has_misplaced_link()) add(ExplainForces, store);
+  if (limit.has_ended() && !is_other_model) AddUnsearched(store, &causes);
   if (stopped != nullptr) *stopped = limit.has_ended();
   DropImpossible(store, &causes);
   std::stable_sort(causes.begin(), causes.end(),

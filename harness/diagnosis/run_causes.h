@@ -30,11 +30,13 @@ struct SearchOptions {
   /// Processor time that the search for causes may take, s: what was found until then stands. Most faults
   /// take tenths of a second, some minutes.
   double seconds = 2.0;
+  /// Whether terms of the model differ from the engine's at one and the same state.
+  bool model_fails = false;
 };
 
 /// All: measurement, actuation, law, contact, geometry, rolling, balance. Forces that follow from links in
-/// other places are not explained. What no robot like this one can have is
-/// listed as not explained.
+/// other places, or from another model, are not explained. What no robot like this one can have is listed as
+/// not explained.
 /// @param void_from of FindVoid, s: how wheels roll is explained up to then.
 /// @param stopped whether the search ended before it was done, by its limit or by the user.
 Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions& options = {},

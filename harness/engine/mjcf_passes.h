@@ -92,6 +92,10 @@ std::optional<std::pair<double, double>> FindForceLimits(const mjModel& m, int a
 /// not know and AdaptMjcf removes), by name: their own, or their class's.
 std::map<std::string, double> FindForceRanges(const MjcfFile& mjcf);
 
+/// Lists what words of later releases, which AdaptMjcf removes, say of the forces of actuators, their own or
+/// their class's: "joint elbow: kv 25".
+std::vector<std::string> ListNewerForces(const MjcfFile& mjcf);
+
 /// Returns the root's last element of that name, which outweighs others; a new one when it has none.
 tinyxml2::XMLElement* RequireSection(tinyxml2::XMLElement* root, const char* name);
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <sstream>
 
 #include "harness/engine/xml.h"
 
@@ -113,6 +114,16 @@ const char* NameOf(MjcfEffect effect) {
   constexpr std::array<const char*, 4> kNames = {"looks, sensors or memory", "contacts, solver or time steps",
                                                  "forces of actuators", "dynamics"};
   return kNames.at(static_cast<size_t>(effect));
+}
+
+std::vector<std::string> ListNewerOfActuators() {
+  std::vector<std::string> attributes;
+  for (const NewerWord& word : kWords) {
+    if (word.elements != "*" || word.effect != kActuators) continue;
+    std::istringstream names{std::string(word.attributes)};
+    for (std::string name; names >> name;) attributes.push_back(name);
+  }
+  return attributes;
 }
 
 const NewerWord* FindNewerWord(std::string_view element, std::string_view attribute) {

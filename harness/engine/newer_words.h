@@ -2,7 +2,9 @@
 
 // Words of MJCFs that releases of MuJoCo after 2.2.2 added.
 
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace dexcheck {
 
@@ -26,6 +28,9 @@ struct NewerWord {
 
 /// The word's entry; nullptr when it is not known. @param attribute empty for the element itself.
 const NewerWord* FindNewerWord(std::string_view element, std::string_view attribute);
+
+/// Attributes of any actuator that act on its force and that 2.2.2 does not have.
+std::vector<std::string> ListNewerOfActuators();
 
 /// "looks, sensors or memory", "contacts, solver or time steps", "forces of actuators", "dynamics".
 const char* NameOf(MjcfEffect effect);

@@ -244,8 +244,8 @@ class TomlCopy {
 
 }  // namespace
 
-CorrectedFile WriteCorrections(const DescriptionFile& source, const UrdfOptions& urdf,
-                               const RecordingJudgement& judgement, const std::filesystem::path& folder) {
+CorrectedFile WriteCorrections(const DescriptionFile& source, const RecordingJudgement& judgement,
+                               const std::filesystem::path& folder) {
   const RobotDescription robot = source.Describe();
   CorrectedFile file;
   const Corrections corrections = Collect(RobotModel(robot.spec), judgement, &file);
@@ -254,7 +254,7 @@ CorrectedFile WriteCorrections(const DescriptionFile& source, const UrdfOptions&
     return file;
   }
   const PrintedRobot before = ReadPrintedRobot(source);
-  file.text = WriteXml(source, urdf, before, CorrectPrinted(robot, before, corrections, &file), folder);
+  file.text = WriteXml(source, before, CorrectPrinted(robot, before, corrections, &file), folder);
   return file;
 }
 

@@ -21,7 +21,7 @@ struct CorrectedFile {
 /// Friction, armature, bodies and gravity, as found, in the file's own numbers; comments stay.
 /// @param folder in which the text will stand: an MJCF finds its meshes from there.
 /// @throws InputError "FILE: ..." where a number stands in no place of its own, as in a template.
-CorrectedFile WriteCorrections(const DescriptionFile& source, const UrdfOptions& urdf,
-                               const RecordingJudgement& judgement, const std::filesystem::path& folder);
+CorrectedFile WriteCorrections(const DescriptionFile& source, const RecordingJudgement& judgement,
+                               const std::filesystem::path& folder);
 
 }  // namespace dexcheck

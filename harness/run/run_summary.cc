@@ -159,8 +159,15 @@ void Judge(const Setup& setup, const ClosedLoop& loop, const SearchOptions& sear
     // A run that ends while everything settles has these steps in its own store.
     const StepStore* const before = is_before ? loop.settling_store() : nullptr;
     bool stopped = false;
+    const auto has_failed = [](const CheckRecord& check) { return check.failed; };
+    const auto is_mismeasured = [](const CheckRecord& check) {
+      return check.failed && check.name == "measurement";
+    };
+    SearchOptions options = search;
+    options.model_fails = std::ranges::any_of(loop.checks().model_checks(), has_failed) &&
+                          std::ranges::none_of(steps, is_mismeasured);
     result->causes =
-        ExplainRun(before != nullptr ? *before : loop.store(), FindVoid(steps), search, &stopped);
+        ExplainRun(before != nullptr ? *before : loop.store(), FindVoid(steps), options, &stopped);
     result->attribution = Attribute(setup.constants(), loop.checks().model_checks(), steps,
                                     loop.checks().context(), &result->causes);
     if (stopped && result->attribution.cause != Cause::kNone)

@@ -303,7 +303,7 @@ void ExpectCorrected(const std::string& file, const std::string& comment, const 
   const RecordingJudgement judgement = JudgeRecordings(model, &recordings, {});
   EXPECT_FALSE(judgement.Agrees());
   const TemporaryFolder folder;
-  const CorrectedFile corrected = WriteCorrections(source, {}, judgement, folder.path());
+  const CorrectedFile corrected = WriteCorrections(source, judgement, folder.path());
   EXPECT_TRUE(corrected.left.empty());
   const std::filesystem::path path =
       folder.path() / ("copy" + std::filesystem::path(file).extension().string());
@@ -338,7 +338,7 @@ TEST(Judge, WritesABodyThatCanBe) {
     judgement.found.push_back({fault, amplitude, amplitude});
   }
   ASSERT_EQ(judgement.found.size(), 2U);
-  const CorrectedFile corrected = WriteCorrections(file, {}, judgement, {});
+  const CorrectedFile corrected = WriteCorrections(file, judgement, {});
   ASSERT_EQ(corrected.left.size(), 1U);
   EXPECT_THAT(corrected.left[0], ::testing::HasSubstr("the nearest one is written"));
   const TemporaryFolder folder;
