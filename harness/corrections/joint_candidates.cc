@@ -256,7 +256,7 @@ void CandidateSearch::SearchRobot() {
       };
       const std::vector<std::string> lacking = list(b, a), surplus = list(a, b);
       if (!lacking.empty() && !surplus.empty())
-        add(Kind::kNumber, 3.0, DescribeRight(JoinNames(surplus), JoinNames(lacking)));
+        add(Kind::kNumber, 8.0, DescribeRight(JoinNames(surplus), JoinNames(lacking)));
       if (!lacking.empty() && surplus.empty()) add(Kind::kMissing, 3.0, JoinNames(lacking));
       if (lacking.empty()) add(Kind::kSurplus, 3.0, JoinNames(surplus));
     } else if (site.kind == SiteKind::kGravity) {
