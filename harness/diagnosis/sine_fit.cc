@@ -7,89 +7,46 @@
 #include <vector>
 
 #include "controller/common/linear_algebra.h"
+#include "harness/diagnosis/line_search.h"
 
 namespace dexcheck {
-namespace {
 
 using Eigen::ArrayXd;
 
-/// Blocks of steps with gaps between them explain several frequencies nearly as well: so many are refined.
-constexpr size_t kMostRefined = 8;
-
-/// Between two values that follow each other, the median.
-double FindSpacing(const ArrayXd& x) {
+Sine FindSine(const ArrayXd& y, const ArrayXd& x) {
+  const ArrayXd since = x - x.minCoeff();
   std::vector<double> apart;
   for (Eigen::Index i = 1; i < x.size(); ++i) apart.push_back(std::abs(x[i] - x[i - 1]));
-  std::nth_element(apart.begin(), apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 2), apart.end());
-  return apart[apart.size() / 2];
+  const auto middle = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 2);
+  std::nth_element(apart.begin(), middle, apart.end());
+  const double densest = 0.4 / *middle, grid = 0.25 / since.maxCoeff();  // four for a period in all of it
+  MatrixXd columns(y.size(), 2);
+  // Minus what is left of y beside a sine of this frequency.
+  const auto score = [&](double frequency) {
+    if (!(frequency > grid)) return -std::numeric_limits<double>::infinity();
+    columns << (2.0 * kPi * frequency * since).sin(), (2.0 * kPi * frequency * since).cos();
+    return -(y.matrix() - columns * SolveLeastSquares(columns, y.matrix())).squaredNorm();
+  };
+  // Blocks of steps with gaps between them explain several frequencies nearly as well: so many are refined,
+  // of those that are better than their neighbours on the grid.
+  constexpr size_t kMostRefined = 8;
+  constexpr int kMostTried = 2000, kHalvings = 32;
+  std::vector<double> scores;
+  for (int i = 2; i < std::min<double>(kMostTried, densest / grid); ++i) scores.push_back(score(i * grid));
+  std::vector<std::pair<double, double>> starts;
+  for (size_t i = 0; i < scores.size(); ++i)
+    if ((i == 0 || scores[i] >= scores[i - 1]) && (i + 1 == scores.size() || scores[i] >= scores[i + 1]))
+      starts.emplace_back(-scores[i], static_cast<double>(i + 2) * grid);
+  std::sort(starts.begin(), starts.end());
+  if (starts.size() > kMostRefined) starts.resize(kMostRefined);
+  double best = 2.0 * grid;
+  for (const auto& [left, start] : starts) {
+    const double near =
+        FindMost(score, start, start + grid, 2.0 * grid, -std::numeric_limits<double>::infinity(), kHalvings);
+    if (score(near) > score(best)) best = near;
+  }
+  score(best);
+  return {best, columns};
 }
-
-class SineSearch {
- public:
-  SineSearch(const ArrayXd& y, const ArrayXd& x) : y_(y), x_(x - x.minCoeff()), columns_(y.size(), 2) {
-    const double whole = x_.maxCoeff();
-    densest_ = 0.4 / FindSpacing(x);
-    grid_ = 0.25 / whole;  // four times as dense as periods in all of it
-  }
-
-  Sine Find() {
-    double best = 2.0 * grid_, least = std::numeric_limits<double>::infinity();
-    for (const double start : ListStarts()) {
-      const auto [frequency, left] = Refine(start);
-      if (left < least) least = left, best = frequency;
-    }
-    Try(best);
-    return {best, columns_};
-  }
-
- private:
-  /// Returns the residual of y beside a sine of this frequency.
-  double Try(double frequency) {
-    const double w = 2.0 * kPi * frequency;
-    columns_.col(0) = (w * x_).sin();
-    columns_.col(1) = (w * x_).cos();
-    const VectorXd a = SolveLeastSquares(columns_, y_.matrix());
-    return (y_.matrix() - columns_ * a).squaredNorm();
-  }
-
-  /// Frequencies of the grid that are better than their neighbours, the best first.
-  std::vector<double> ListStarts() {
-    const int count = static_cast<int>(std::min(2000.0, densest_ / grid_));
-    std::vector<double> left;
-    for (int i = 2; i < count; ++i) left.push_back(Try(i * grid_));
-    std::vector<std::pair<double, double>> least;
-    for (size_t i = 0; i < left.size(); ++i) {
-      const bool is_least =
-          (i == 0 || left[i] <= left[i - 1]) && (i + 1 == left.size() || left[i] <= left[i + 1]);
-      if (is_least) least.emplace_back(left[i], static_cast<double>(i + 2) * grid_);
-    }
-    std::sort(least.begin(), least.end());
-    if (least.size() > kMostRefined) least.resize(kMostRefined);
-    std::vector<double> starts;
-    for (const auto& one : least) starts.push_back(one.second);
-    return starts;
-  }
-
-  std::pair<double, double> Refine(double best) {
-    double least = Try(best), width = grid_;
-    for (int i = 0; i < 60; ++i, width *= 0.7) {
-      for (const double to : {best - width, best + width}) {
-        if (!(to > grid_)) continue;
-        const double left = Try(to);
-        if (left < least) least = left, best = to;
-      }
-    }
-    return {best, least};
-  }
-
-  const ArrayXd& y_;
-  ArrayXd x_;
-  MatrixXd columns_;
-  double densest_ = 0.0, grid_ = 0.0;
-};
-
-}  // namespace
-
-Sine FindSine(const ArrayXd& y, const ArrayXd& x) { return SineSearch(y, x).Find(); }
 
 }  // namespace dexcheck
