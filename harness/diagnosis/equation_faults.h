@@ -3,8 +3,9 @@
 // Equations that are wrong on purpose, the one table of them: in a comparison of terms (formula_mutants.h)
 // they stand in the place of the model's, in a run the controller goes by them at every step.
 
+#include <optional>
 #include <string>
-#include <variant>
+#include <utility>
 #include <vector>
 
 #include "controller/control/grasp_model.h"
@@ -22,65 +23,32 @@ struct RobotEquations {
   VectorXd& friction;
 };
 
-// The change of an equation, by the object that it describes.
+/// The change of an equation: one of these.
+struct EquationChange {
+  void (*robot)(const RobotEquations&) = nullptr;
+  bool transposes_links = false, transposes_frames = false;  ///< Their rotations.
+  Matrix6d (*jacobian)(const Pose&) = nullptr;  ///< J of a frame, from the left, by the frame's pose.
+  std::optional<double> jacobian_rate = {};     ///< Factor of J_dot, or in a run J_B_dot.
+  /// Joints whose positions and rates are exchanged on their way into the model.
+  std::optional<std::pair<int, int>> exchanged = {};
+  void (*energy)(EnergyAndMomentum*) = nullptr;
+  void (*object_pose)(const Vector6d& X_o, Pose*) = nullptr;
+  void (*object)(ObjectTerms*) = nullptr;           ///< Dynamics in X_o.
+  void (*object_body)(ObjectBodyTerms*) = nullptr;  ///< Dynamics in its body velocity.
+  ContactGeometry (*contact_frame)(const Surface& fingertip, const Surface& object,
+                                   ContactCoordinates) = nullptr;
+  Matrix6d (*grasp_map)(const Pose&) =
+      nullptr;                                ///< G_i by another transform of wrenches than Ad^-T of g_o_cf.
+  std::optional<double> grasp_map_rate = {};  ///< Factor of G_dot.
+  /// Rows of J_B' of a contact, from J_f.
+  MatrixXd (*contact_jacobian)(const ContactGeometry&, const Matrix6Xd&) = nullptr;
+  void (*rolling)(ContactGeometry*, Vector6d* V) = nullptr;  ///< By which (40) computes, V = V_co_cf^cf.
 
-struct RobotChange {
-  void (*make)(const RobotEquations&);
+  [[nodiscard]] bool is_of_object() const { return object_pose || object || object_body; }
+  [[nodiscard]] bool is_of_contact() const {
+    return contact_frame || grasp_map || grasp_map_rate || contact_jacobian || rolling;
+  }
 };
-/// Rotations of links, or of frames.
-struct RotationsTransposed {
-  bool of_frames;
-};
-/// J of a frame, from the left, by the frame's pose.
-struct JacobianChange {
-  Matrix6d (*make)(const Pose&);
-};
-/// J_dot, or in a run J_B_dot.
-struct JacobianRate {
-  double factor;
-};
-/// Positions and rates of two joints on their way into the model.
-struct JointsExchanged {
-  int a, b;
-};
-struct EnergyChange {
-  void (*make)(EnergyAndMomentum*);
-};
-struct ObjectPoseChange {
-  void (*make)(const Vector6d& X_o, Pose*);
-};
-/// Changes the object's dynamics in X_o.
-struct ObjectChange {
-  void (*make)(ObjectTerms*);
-};
-/// Changes the object's dynamics in its body velocity.
-struct ObjectBodyChange {
-  void (*make)(ObjectBodyTerms*);
-};
-struct ContactFrameChange {
-  ContactGeometry (*make)(const Surface& fingertip, const Surface& object, ContactCoordinates);
-};
-/// G_i by another transform of wrenches than Ad^-T of g_o_cf.
-struct GraspMapChange {
-  Matrix6d (*make)(const Pose&);
-};
-/// G_dot.
-struct GraspMapRate {
-  double factor;
-};
-/// Rows of J_B' of a contact, from J_f.
-struct ContactJacobianChange {
-  MatrixXd (*make)(const ContactGeometry&, const Matrix6Xd&);
-};
-/// kappa_dot of a contact, from V_co_cf^cf, by another equation than (40).
-struct RollingChange {
-  Vector5d (*make)(ContactGeometry, Vector6d);
-};
-
-using EquationChange =
-    std::variant<RobotChange, RotationsTransposed, JacobianChange, JacobianRate, JointsExchanged,
-                 EnergyChange, ObjectPoseChange, ObjectChange, ObjectBodyChange, ContactFrameChange,
-                 GraspMapChange, GraspMapRate, ContactJacobianChange, RollingChange>;
 
 /// A wrong equation.
 struct EquationFault {
@@ -94,35 +62,10 @@ struct EquationFault {
 /// All that apply to the model: those of the object and of contacts need an object and fingertips.
 std::vector<EquationFault> ListEquationFaults(const RobotModel& model);
 
-/// Changes the terms of a run after they were evaluated, through the references that the model shows: the
-/// model itself is not const.
-class FaultyTerms {
- public:
-  /// @param model evaluated at `state`; both outlive this.
-  FaultyTerms(GraspModel* model, const MeasuredState& state) : model_(*model), state_(state) {}
-
-  /// Makes a fault that has a check, and what follows from it: the slip of each contact (45), (46).
-  void Make(const EquationChange& change) const;
-
- private:
-  template <typename T>
-  static T& Open(const T& shown) {
-    return const_cast<T&>(shown);
-  }
-  [[nodiscard]] const GraspTerms& grasp() const { return model_.grasp(); }
-  [[nodiscard]] const ContactGeometry& geometry(int contact) const;
-
-  void MakeOne(const RobotChange& change) const;
-  void MakeOne(const JacobianRate& change) const { Open(grasp().J_B_dot()) *= change.factor; }
-  void MakeOne(const GraspMapRate& change) const { Open(grasp().G_dot()) *= change.factor; }
-  void MakeOne(const ObjectChange& change) const { change.make(&Open(grasp().coordinates())); }
-  void MakeOne(const ObjectBodyChange& change) const { change.make(&Open(grasp().body())); }
-  void MakeOne(const GraspMapChange& change) const;
-  void MakeOne(const ContactJacobianChange& change) const;
-  void MakeOne(const RollingChange& change) const;
-
-  GraspModel& model_;
-  const MeasuredState& state_;
-};
+/// Makes a fault that has a check, and what follows from it: the slip of each contact (45), (46). The terms
+/// of a run are changed after they were evaluated, through the references that the model shows: the model
+/// itself is not const.
+/// @param model evaluated at `state`.
+void MakeFault(const EquationChange& change, const MeasuredState& state, GraspModel* model);
 
 }  // namespace dexcheck

@@ -20,46 +20,44 @@ class FaultyView : public ModelView {
   void SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity) override {
     VectorXd at = q;
     VectorXd rates = velocity;
-    if (const auto* const joints = std::get_if<JointsExchanged>(&change_)) {
+    if (change_.exchanged) {
+      const auto& [a, b] = *change_.exchanged;
       const int base = size() - model().num_joints();
       const int first = model().num_base_positions();
-      std::swap(at[first + joints->a], at[first + joints->b]);
-      std::swap(rates[base + joints->a], rates[base + joints->b]);
+      std::swap(at[first + a], at[first + b]);
+      std::swap(rates[base + a], rates[base + b]);
     }
     ModelView::SetState(at, rates);
     M_ = ModelView::M();
     C_ = ModelView::C();
     gravity_ = ModelView::gravity();
     friction_ = ModelView::friction();
-    if (const auto* const robot = std::get_if<RobotChange>(&change_))
-      robot->make({model(), at, rates, M_, C_, gravity_, friction_});
+    if (change_.robot) change_.robot({model(), at, rates, M_, C_, gravity_, friction_});
   }
   [[nodiscard]] const MatrixXd& M() const override { return M_; }
   [[nodiscard]] const MatrixXd& C() const override { return C_; }
   [[nodiscard]] const VectorXd& gravity() const override { return gravity_; }
   [[nodiscard]] const VectorXd& friction() const override { return friction_; }
   [[nodiscard]] Pose CalcLinkPose(int joint) const override {
-    return Transpose(ModelView::CalcLinkPose(joint), false);
+    return Transpose(ModelView::CalcLinkPose(joint), change_.transposes_links);
   }
   [[nodiscard]] Pose CalcFramePose(int frame) const override {
-    return Transpose(ModelView::CalcFramePose(frame), true);
+    return Transpose(ModelView::CalcFramePose(frame), change_.transposes_frames);
   }
   void CalcFrameJacobian(int frame, Eigen::Ref<Matrix6Xd> J, Eigen::Ref<Matrix6Xd> J_dot) const override {
     ModelView::CalcFrameJacobian(frame, J, J_dot);
-    if (const auto* const jacobian = std::get_if<JacobianChange>(&change_))
-      J = jacobian->make(CalcFramePose(frame)) * J;
-    if (const auto* const rate = std::get_if<JacobianRate>(&change_)) J_dot *= rate->factor;
+    if (change_.jacobian) J = change_.jacobian(CalcFramePose(frame)) * J;
+    if (change_.jacobian_rate) J_dot *= *change_.jacobian_rate;
   }
   [[nodiscard]] EnergyAndMomentum CalcEnergyAndMomentum() const override {
     EnergyAndMomentum terms = ModelView::CalcEnergyAndMomentum();
-    if (const auto* const energy = std::get_if<EnergyChange>(&change_)) energy->make(&terms);
+    if (change_.energy) change_.energy(&terms);
     return terms;
   }
 
  private:
-  [[nodiscard]] Pose Transpose(Pose X, bool of_frames) const {
-    const auto* const rotations = std::get_if<RotationsTransposed>(&change_);
-    if (rotations != nullptr && rotations->of_frames == of_frames) X.linear().transposeInPlace();
+  static Pose Transpose(Pose X, bool is_wrong) {
+    if (is_wrong) X.linear().transposeInPlace();
     return X;
   }
 
@@ -76,16 +74,16 @@ ModelViewFactory UseView(const EquationChange& change) {
 
 ObjectFormulas UseObject(const EquationChange& change) {
   ObjectFormulas formulas;
-  if (const auto* const object = std::get_if<ObjectChange>(&change)) {
-    formulas.terms = [make = object->make](const MassProperties& body, const Vector3d& gravity,
-                                           const Vector6d& X_o, const Vector6d& X_o_dot) {
+  if (change.object) {
+    formulas.terms = [make = change.object](const MassProperties& body, const Vector3d& gravity,
+                                            const Vector6d& X_o, const Vector6d& X_o_dot) {
       ObjectTerms terms = CalcObjectTerms(body, gravity, X_o, X_o_dot);
       make(&terms);
       return terms;
     };
   }
-  if (const auto* const pose = std::get_if<ObjectPoseChange>(&change)) {
-    formulas.pose = [make = pose->make](const Vector6d& X_o) {
+  if (change.object_pose) {
+    formulas.pose = [make = change.object_pose](const Vector6d& X_o) {
       Pose X = CalcObjectPose(X_o);
       make(X_o, &X);
       return X;
@@ -94,24 +92,22 @@ ObjectFormulas UseObject(const EquationChange& change) {
   return formulas;
 }
 
-/// Those of contacts; none of others.
-std::optional<ContactFormulas> UseContact(const EquationChange& change) {
+ContactFormulas UseContact(const EquationChange& change) {
   ContactFormulas formulas;
-  if (const auto* const frame = std::get_if<ContactFrameChange>(&change)) {
-    formulas.geometry = frame->make;
-  } else if (const auto* const grasp_map = std::get_if<GraspMapChange>(&change)) {
-    formulas.grasp_map = [make = grasp_map->make](const Contact& contact, Eigen::Ref<Matrix6Xd> G) {
+  if (change.contact_frame) formulas.geometry = change.contact_frame;
+  if (change.grasp_map)
+    formulas.grasp_map = [make = change.grasp_map](const Contact& contact, Eigen::Ref<Matrix6Xd> G) {
       G = make(contact.geometry.g_o_cf).leftCols<3>();
     };
-  } else if (const auto* const jacobian = std::get_if<ContactJacobianChange>(&change)) {
-    formulas.jacobian = [make = jacobian->make](
+  if (change.contact_jacobian)
+    formulas.jacobian = [make = change.contact_jacobian](
                             const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
                             Eigen::Ref<MatrixXd> rows) { rows = make(contact.geometry, J_f); };
-  } else if (const auto* const rolling = std::get_if<RollingChange>(&change)) {
-    formulas.kappa_dot = rolling->make;
-  } else {
-    return std::nullopt;
-  }
+  if (change.rolling)
+    formulas.kappa_dot = [make = change.rolling](ContactGeometry geometry, Vector6d V) {
+      make(&geometry, &V);
+      return CalcKappaDot(geometry, V);
+    };
   return formulas;
 }
 
@@ -156,18 +152,16 @@ void RunFormulaMutant(const Adapter& adapter, int samples, FormulaMutant* mutant
   options.samples = samples;
   options.make_view = UseView(equation.change);
   options.object = UseObject(equation.change);
-  const std::optional<ContactFormulas> contact = UseContact(equation.change);
   const std::vector<CheckRecord> records =
-      contact ? CheckContacts(adapter, *contact, samples)
-              : CheckConsistency(adapter, options, [](long) { return true; }).terms;
+      equation.change.is_of_contact() ? CheckContacts(adapter, UseContact(equation.change), samples)
+                                      : CheckConsistency(adapter, options, [](long) { return true; }).terms;
   AddFailed(records, &mutant->failed_checks);
   mutant->named_first = std::any_of(records.begin(), records.end(), [&](const CheckRecord& record) {
     return record.failed && record.name == equation.term;
   });
   mutant->outcome = mutant->failed_checks.empty() ? MutantOutcome::kSurvived : MutantOutcome::kKilled;
-  const bool is_of_object = std::holds_alternative<ObjectChange>(equation.change) ||
-                            std::holds_alternative<ObjectPoseChange>(equation.change);
-  if (mutant->outcome == MutantOutcome::kKilled || contact || is_of_object) return;
+  const bool is_of_robot = !equation.change.is_of_contact() && !equation.change.is_of_object();
+  if (mutant->outcome == MutantOutcome::kKilled || !is_of_robot) return;
   AnalyticProvider faulty(adapter.model(), "faulty", options.make_view);
   if (!HasEffect(adapter.model(), &faulty, samples, options.seed)) mutant->outcome = MutantOutcome::kNoEffect;
 }

@@ -305,10 +305,9 @@ void LawEntryList::AddMatrices() {
     inputs->M = MatrixXd(inputs->M.diagonal().asDiagonal());
   });
   for (const EquationFault& equation : ListEquationFaults(model_)) {
-    const auto* const change = std::get_if<RobotChange>(&equation.change);
-    if (change == nullptr) continue;
-    AddEdit(equation.name, [this_model = &model_, make = change->make](const LawAtStep& at,
-                                                                       LawInputs* inputs) {
+    if (!equation.change.robot) continue;
+    AddEdit(equation.name, [this_model = &model_, make = equation.change.robot](const LawAtStep& at,
+                                                                                LawInputs* inputs) {
       LawTerms& terms = inputs->terms;
       make({*this_model, inputs->now.q, inputs->now.xi, inputs->M, inputs->C, terms.gravity, terms.friction});
       terms.C_xi += (inputs->C - at.inputs.C) * inputs->now.xi;
