@@ -1,7 +1,6 @@
 #include "harness/diagnosis/mutation.h"
 
 #include <algorithm>
-#include <map>
 #include <optional>
 #include <utility>
 
@@ -164,35 +163,15 @@ std::vector<Mutant> ListMutants(const RobotSpec& spec, double scale) {
 }
 
 bool IsNamedBy(const RobotSpec& spec, const Parameter& number, const CorrectionItem& cause) {
-  using enum SiteKind;
-  static const std::map<Kind, SiteKind> kSites = {{Kind::kAlpha, kRotation},
-                                                  {Kind::kHomeAngle, kRotation},
-                                                  {Kind::kRotation, kRotation},
-                                                  {Kind::kA, kPosition},
-                                                  {Kind::kD, kPosition},
-                                                  {Kind::kPosition, kPosition},
-                                                  {Kind::kDamping, kDamping},
-                                                  {Kind::kArmature, kArmature},
-                                                  {Kind::kDryFriction, kFriction},
-                                                  {Kind::kLowerLimit, kRange},
-                                                  {Kind::kUpperLimit, kRange},
-                                                  {Kind::kMass, kMass},
-                                                  {Kind::kCom, kCom},
-                                                  {Kind::kInertia, kInertia},
-                                                  {Kind::kGravity, kGravity},
-                                                  {Kind::kFramePosition, kPosition},
-                                                  {Kind::kFrameRotation, kRotation},
-                                                  {Kind::kBasePosition, kPosition},
-                                                  {Kind::kBaseRotation, kRotation}};
-  const auto site = kSites.find(number.kind);
-  if (site == kSites.end()) return false;
+  const std::optional<SiteKind> site = FindSite(number.kind);
+  if (!site) return false;
   std::string place = number.kind == Kind::kGravity ? "robot" : DescribePart(spec, number);
   if (place.starts_with("base ")) place = "link " + place.substr(5);
   if (std::ranges::find(cause.places, place) == cause.places.end()) return false;
   // A solid of another mass has an inertia that goes with it.
   if (cause.fault.kind == CorrectionKind::kWithMass) return number.kind == Kind::kMass;
-  if (cause.fault.whole) return IsOfBody(cause.fault.of) == IsOfBody(site->second);
-  return cause.fault.of == site->second;
+  if (cause.fault.whole) return IsOfBody(cause.fault.of) == IsOfBody(*site);
+  return cause.fault.of == *site;
 }
 
 MutatedPair::MutatedPair(const DescriptionFile& first, const DescriptionFile& second)

@@ -36,47 +36,57 @@ auto& TorusOf(Spec& spec) {
 }
 
 struct ParameterTable {
-  enum Part { kRow, kJoint, kLink, kFrame, kBase, kRobot, kObject };  ///< What a number belongs to.
+  enum Part { kJoint, kLink, kFrame, kBase, kWheels, kRobot, kObject };  ///< What a number belongs to.
   enum Form { kNumber, kAngle, kVector, kPosition, kRotation, kTensor };
   struct Entry {
     const char* name;
     Part part;
     Form form;
     NumberPlace place;
+    std::optional<SiteKind> site = std::nullopt;
   };
   static const Entry kEntries[32];
 };
 
 /// In the order of the enumeration.
 constexpr ParameterTable::Entry ParameterTable::kEntries[] = {
-    {"alpha", kRow, kAngle, [](auto& s, int i) { return &JointAt(s, i).mdh.alpha; }},
-    {"a", kRow, kNumber, [](auto& s, int i) { return &JointAt(s, i).mdh.a; }},
-    {"q (home angle)", kRow, kAngle, [](auto& s, int i) { return &JointAt(s, i).mdh.q; }},
-    {"d", kRow, kNumber, [](auto& s, int i) { return &JointAt(s, i).mdh.d; }},
-    {"position", kRow, kPosition, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); }},
-    {"rotation", kRow, kRotation, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); }},
-    {"damping", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).damping; }},
-    {"armature", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).armature; }},
-    {"dry friction", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).dry_friction; }},
-    {"lower limit", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).lower; }},
-    {"upper limit", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).upper; }},
-    {"mass", kLink, kNumber, [](auto& s, int i) { return &BodyAt(s, i).mass; }},
-    {"centre of mass", kLink, kVector, [](auto& s, int i) { return BodyAt(s, i).com.data(); }},
-    {"inertia", kLink, kTensor, [](auto& s, int i) { return BodyAt(s, i).inertia.data(); }},
-    {"position", kFrame, kPosition, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); }},
-    {"rotation", kFrame, kRotation, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); }},
+    {"alpha", kJoint, kAngle, [](auto& s, int i) { return &JointAt(s, i).mdh.alpha; }, SiteKind::kRotation},
+    {"a", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).mdh.a; }, SiteKind::kPosition},
+    {"q (home angle)", kJoint, kAngle, [](auto& s, int i) { return &JointAt(s, i).mdh.q; },
+     SiteKind::kRotation},
+    {"d", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).mdh.d; }, SiteKind::kPosition},
+    {"position", kJoint, kPosition, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); },
+     SiteKind::kPosition},
+    {"rotation", kJoint, kRotation, [](auto& s, int i) { return JointAt(s, i).X_PB.data(); },
+     SiteKind::kRotation},
+    {"dry friction", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).dry_friction; },
+     SiteKind::kFriction},
+    {"damping", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).damping; }, SiteKind::kDamping},
+    {"armature", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).armature; },
+     SiteKind::kArmature},
+    {"lower limit", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).lower; }, SiteKind::kRange},
+    {"upper limit", kJoint, kNumber, [](auto& s, int i) { return &JointAt(s, i).upper; }, SiteKind::kRange},
+    {"mass", kLink, kNumber, [](auto& s, int i) { return &BodyAt(s, i).mass; }, SiteKind::kMass},
+    {"centre of mass", kLink, kVector, [](auto& s, int i) { return BodyAt(s, i).com.data(); },
+     SiteKind::kCom},
+    {"inertia", kLink, kTensor, [](auto& s, int i) { return BodyAt(s, i).inertia.data(); },
+     SiteKind::kInertia},
+    {"position", kFrame, kPosition, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); },
+     SiteKind::kPosition},
+    {"rotation", kFrame, kRotation, [](auto& s, int i) { return FrameAt(s, i).X_LF.data(); },
+     SiteKind::kRotation},
     {"fingertip radius", kFrame, kNumber, [](auto& s, int i) { return &*FrameAt(s, i).sphere_radius; }},
-    {"position", kBase, kPosition, [](auto& s, int) { return s.base.X_B0.data(); }},
-    {"rotation", kBase, kRotation, [](auto& s, int) { return s.base.X_B0.data(); }},
-    {"wheel radius", kBase, kNumber, [](auto& s, int) { return &s.base.wheel_radius; }},
-    {"wheel distance", kBase, kNumber, [](auto& s, int) { return &s.base.wheel_distance; }},
-    {"wheel mass", kBase, kNumber, [](auto& s, int) { return &s.base.wheel.mass; }},
-    {"wheel spin inertia", kBase, kNumber, [](auto& s, int) { return &s.base.wheel.spin_inertia; }},
-    {"wheel transverse inertia", kBase, kNumber,
+    {"position", kBase, kPosition, [](auto& s, int) { return s.base.X_B0.data(); }, SiteKind::kPosition},
+    {"rotation", kBase, kRotation, [](auto& s, int) { return s.base.X_B0.data(); }, SiteKind::kRotation},
+    {"wheel radius", kWheels, kNumber, [](auto& s, int) { return &s.base.wheel_radius; }},
+    {"wheel distance", kWheels, kNumber, [](auto& s, int) { return &s.base.wheel_distance; }},
+    {"wheel mass", kWheels, kNumber, [](auto& s, int) { return &s.base.wheel.mass; }},
+    {"wheel spin inertia", kWheels, kNumber, [](auto& s, int) { return &s.base.wheel.spin_inertia; }},
+    {"wheel transverse inertia", kWheels, kNumber,
      [](auto& s, int) { return &s.base.wheel.transverse_inertia; }},
-    {"wheel armature", kBase, kNumber, [](auto& s, int) { return &s.base.wheel.armature; }},
-    {"wheel damping", kBase, kNumber, [](auto& s, int) { return &s.base.wheel.damping; }},
-    {"gravity", kRobot, kVector, [](auto& s, int) { return s.gravity.data(); }},
+    {"wheel armature", kWheels, kNumber, [](auto& s, int) { return &s.base.wheel.armature; }},
+    {"wheel damping", kWheels, kNumber, [](auto& s, int) { return &s.base.wheel.damping; }},
+    {"gravity", kRobot, kVector, [](auto& s, int) { return s.gravity.data(); }, SiteKind::kGravity},
     {"mass", kObject, kNumber, [](auto& s, int) { return &s.object->body.mass; }},
     {"inertia", kObject, kTensor, [](auto& s, int) { return s.object->body.inertia.data(); }},
     {"friction", kObject, kNumber, [](auto& s, int) { return &s.object->friction; }},
@@ -118,39 +128,33 @@ Vector3d ToRpy(const Matrix3d& R) {
 
 std::vector<Parameter> ListParameters(const RobotSpec& spec) {
   std::vector<Parameter> all;
-  const auto add = [&](int index, std::initializer_list<Kind> kinds) {
-    for (const Kind kind : kinds) {
+  const auto has = [&](Kind kind, int index) {
+    if (kind == Kind::kDryFriction) return spec.joints[static_cast<size_t>(index)].dry_friction > 0.0;
+    if (kind == Kind::kSphereRadius) return spec.frames[static_cast<size_t>(index)].sphere_radius.has_value();
+    if (kind == Kind::kBasePosition) return spec.base.type != BaseType::kFloating;
+    if (kind == Kind::kBaseRotation) return spec.base.type == BaseType::kFixed;
+    if (kind >= Kind::kObjectRingRadius) return std::holds_alternative<SolidTorus>(spec.object->shape);
+    return true;
+  };
+  const auto add = [&](ParameterTable::Part part, int index) {
+    for (size_t i = 0; i < std::size(ParameterTable::kEntries); ++i) {
+      const Kind kind{static_cast<int>(i)};
+      if (EntryFor(kind).part != part || !has(kind, index)) continue;
       for (int k = 0; k < CountComponents(kind); ++k) all.push_back({kind, index, k});
     }
   };
-  for (int i = 0; i < static_cast<int>(spec.joints.size()); ++i) {
-    add(i, {Kind::kAlpha, Kind::kA, Kind::kHomeAngle, Kind::kD, Kind::kPosition, Kind::kRotation});
-    if (spec.joints[static_cast<size_t>(i)].dry_friction > 0.0) add(i, {Kind::kDryFriction});
-    add(i, {Kind::kDamping, Kind::kArmature, Kind::kLowerLimit, Kind::kUpperLimit, Kind::kMass, Kind::kCom,
-            Kind::kInertia});
-  }
-  for (int i = 0; i < static_cast<int>(spec.frames.size()); ++i) {
-    add(i, {Kind::kFramePosition, Kind::kFrameRotation});
-    if (spec.frames[static_cast<size_t>(i)].sphere_radius) add(i, {Kind::kSphereRadius});
-  }
-  if (spec.base.type != BaseType::kFloating) add(-1, {Kind::kBasePosition});
-  if (spec.base.type == BaseType::kFixed) {
-    add(-1, {Kind::kBaseRotation});
-  } else {
-    add(-1, {Kind::kMass, Kind::kCom, Kind::kInertia});
-  }
-  if (spec.base.type == BaseType::kDifferentialDrive) {
-    add(-1, {Kind::kWheelRadius, Kind::kWheelDistance, Kind::kWheelMass, Kind::kWheelSpinInertia,
-             Kind::kWheelTransverseInertia, Kind::kWheelArmature, Kind::kWheelDamping});
-  }
-  add(-1, {Kind::kGravity});
-  if (spec.object) {
-    add(-1, {Kind::kObjectMass, Kind::kObjectInertia, Kind::kObjectFriction});
-    if (std::holds_alternative<SolidTorus>(spec.object->shape))
-      add(-1, {Kind::kObjectRingRadius, Kind::kObjectTubeRadius});
-  }
+  for (int i = 0; i < static_cast<int>(spec.joints.size()); ++i)
+    for (const auto part : {ParameterTable::kJoint, ParameterTable::kLink}) add(part, i);
+  for (int i = 0; i < static_cast<int>(spec.frames.size()); ++i) add(ParameterTable::kFrame, i);
+  add(ParameterTable::kBase, -1);
+  if (spec.base.type != BaseType::kFixed) add(ParameterTable::kLink, -1);
+  if (spec.base.type == BaseType::kDifferentialDrive) add(ParameterTable::kWheels, -1);
+  add(ParameterTable::kRobot, -1);
+  if (spec.object) add(ParameterTable::kObject, -1);
   return all;
 }
+
+std::optional<SiteKind> FindSite(ParameterKind kind) { return EntryFor(kind).site; }
 
 double GetValue(const RobotSpec& spec, const Parameter& parameter) {
   const double* const place = EntryFor(parameter.kind).place.read(spec, parameter.index);
@@ -206,13 +210,11 @@ std::string DescribePart(const RobotSpec& spec, const Parameter& p) {
       return "gravity";
     case ParameterTable::kObject:
       return "object " + spec.object->name;
-    case ParameterTable::kRow:
     case ParameterTable::kJoint:
       return "joint " + spec.joints[static_cast<size_t>(p.index)].name;
-    case ParameterTable::kBase:
-      break;
+    default:
+      return "base " + spec.base.link;
   }
-  return "base " + spec.base.link;
 }
 
 std::string DescribeGroup(const Parameter& parameter) { return EntryFor(parameter.kind).name; }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/model/robot_model.h"
+#include "harness/corrections/correction.h"
 
 namespace dexcheck {
 
@@ -17,9 +18,9 @@ enum class ParameterKind {
   kD,              ///< m
   kPosition,       ///< Where the row starts on the parent link (`pose`), m.
   kRotation,       ///< The same as roll, pitch, yaw, rad.
+  kDryFriction,    ///< Of a joint, N m or N
   kDamping,        ///< Of a joint, N m s/rad or N s/m.
   kArmature,       ///< kg m^2 or kg
-  kDryFriction,    ///< N m or N
   kLowerLimit,     ///< rad or m
   kUpperLimit,     ///< rad or m
   kMass,           ///< Of a link, kg.
@@ -56,6 +57,9 @@ struct Parameter {
 /// rotation of a moving one) is not among them, nor is dry
 /// friction where there is none.
 std::vector<Parameter> ListParameters(const RobotSpec& spec);
+
+/// The number of a file's link or joint that it is; none of what no file prints.
+std::optional<SiteKind> FindSite(ParameterKind kind);
 
 /// In the units above. The setter leaves the specification unchecked; RobotModel's constructor checks it.
 double GetValue(const RobotSpec& spec, const Parameter& parameter);
