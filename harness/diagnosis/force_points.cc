@@ -1,6 +1,7 @@
 #include "harness/diagnosis/force_points.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "controller/common/linear_algebra.h"
@@ -12,10 +13,6 @@ namespace {
 
 using Eigen::Index;
 using namespace force_fault;
-
-constexpr size_t kMostBodies = 8;       // that are looked at
-constexpr double kPointExplains = 0.9;  // of |y|^2, by force and moment
-constexpr int kMostIterations = 30;     // of Gauss-Newton
 
 /// Columns of force and moment of one body, and which way it is turned at each step.
 struct Body {
@@ -47,14 +44,11 @@ struct Body {
   }
 };
 
-std::vector<Body> ListBodies(const std::vector<Turns>& turns, const std::vector<Candidate>& candidates) {
+std::vector<Body> ListBodies(const std::vector<Turns>& turns, std::span<const Candidate> candidates) {
   std::vector<Body> bodies;
   for (const Candidate& force : candidates) {
     if (force.fault != kForce) continue;
-    const auto moment = std::find_if(candidates.begin(), candidates.end(), [&](const Candidate& one) {
-      return one.fault == "moment" && one.place == force.place;
-    });
-    Body body{&force, &*moment, {}, {0, static_cast<Index>(turns.size())}};
+    Body body{&force, &FindCandidate(candidates, "moment", force.place), {}, {0, std::ssize(turns)}};
     for (const Turns& step : turns) body.turns.push_back(step[bodies.size()]);
     bodies.push_back(std::move(body));
   }
@@ -62,7 +56,7 @@ std::vector<Body> ListBodies(const std::vector<Turns>& turns, const std::vector<
 }
 
 /// The body of a force at a point, in the steps in which that acts.
-Body FindBody(const std::vector<Turns>& turns, const std::vector<Candidate>& candidates,
+Body FindBody(const std::vector<Turns>& turns, std::span<const Candidate> candidates,
               const ForceAtPoint& force) {
   const std::vector<Body> bodies = ListBodies(turns, candidates);
   Body body = *std::ranges::find(
@@ -80,95 +74,97 @@ Candidate MakeCandidate(const Body& body, const Vector3d& p) {
   return candidate;
 }
 
-/// The point at which a force explains most of y.
-class PointFit {
- public:
-  PointFit(const VectorXd& y, const Body& body) : y_(&y), body_(&body) {
-    MatrixXd both(y.size(), 6);
-    both << body.force->columns, body.moment->columns;
-    const VectorXd a = SolveLeastSquares(both, y);
-    explains_ = 1.0 - (y - both * a).squaredNorm() / y.squaredNorm();
-    F_ = a.head<3>();
-    if (F_.squaredNorm() > 0.0)
-      p_ = body.turns.front().transpose() * F_.cross(Vector3d(a.tail<3>())) / F_.squaredNorm();
+/// Moves a force and its point to where they explain most of y. @param beside columns of what else there is.
+/// @return none where there is no such point.
+std::optional<ForceAtPoint> Improve(const VectorXd& y, const Body& body, ForceAtPoint force, double reach,
+                                    const MatrixXd& beside) {
+  constexpr int kMostIterations = 30;  // of Gauss-Newton
+  constexpr double kExact = 1e-10;     // m
+  for (int i = 0; i < kMostIterations; ++i) {
+    MatrixXd all(y.size(), 6 + beside.cols());
+    all << body.AtPoint(force.point), body.ByPoint(force.force), beside;
+    const VectorXd a = SolveLeastSquares(all, y);
+    force.force = a.head<3>();
+    force.point += a.segment<3>(3);
+    if (a.segment<3>(3).norm() < kExact) break;
   }
-
-  /// By force and moment, of |y|^2.
-  [[nodiscard]] double explains() const { return explains_; }
-
-  /// From this force on.
-  void Start(const ForceAtPoint& force) { F_ = force.force, p_ = force.point; }
-
-  /// @param beside columns of what else there is. @return whether there is such a point.
-  bool Improve(double reach, const MatrixXd& beside) {
-    constexpr double kExact = 1e-10;  // m
-    for (int i = 0; i < kMostIterations; ++i) {
-      MatrixXd all(y_->size(), 6 + beside.cols());
-      all << body_->AtPoint(p_), body_->ByPoint(F_), beside;
-      const VectorXd a = SolveLeastSquares(all, *y_);
-      F_ = a.head<3>();
-      p_ += a.segment<3>(3);
-      if (a.segment<3>(3).norm() < kExact) break;
-    }
-    return p_.norm() < reach;
-  }
-
-  [[nodiscard]] ForceAtPoint force() const { return {body_->force->place, F_, p_, body_->within}; }
-  [[nodiscard]] Candidate Make() const { return MakeCandidate(*body_, p_); }
-
- private:
-  const VectorXd* y_;
-  const Body* body_;
-  double explains_ = 0.0;
-  Vector3d F_ = Vector3d::Zero(), p_ = Vector3d::Zero();
-};
+  return force.point.norm() < reach ? std::optional(force) : std::nullopt;
+}
 
 }  // namespace
 
+const Candidate& FindCandidate(std::span<const Candidate> candidates, std::string_view fault,
+                               std::string_view place) {
+  return *std::ranges::find_if(
+      candidates, [&](const Candidate& one) { return one.fault == fault && one.place == place; });
+}
+
+Vector3d CalcArm(const Eigen::Ref<const VectorXd>& wrench) {
+  const Vector3d force = wrench.head<3>(), moment = wrench.tail<3>();
+  return force.cross(moment) / force.squaredNorm();
+}
+
 void AddForcesAtPoints(const VectorXd& y, const std::vector<Turns>& turns, double reach,
                        std::vector<Candidate>* candidates) {
+  constexpr size_t kMostBodies = 8;       // that are looked at
+  constexpr double kPointExplains = 0.9;  // of |y|^2, by force and moment
   const std::vector<Body> bodies = ListBodies(turns, *candidates);
-  std::vector<PointFit> fits;
-  fits.reserve(bodies.size());
-  for (const Body& body : bodies) fits.emplace_back(y, body);
-  std::stable_sort(fits.begin(), fits.end(),
-                   [](const PointFit& a, const PointFit& b) { return a.explains() > b.explains(); });
-  std::vector<Candidate> added;
-  for (PointFit& fit : fits) {
-    if (added.size() == kMostBodies || fit.explains() < kPointExplains || SearchLimit::IsOver()) break;
-    if (fit.Improve(reach, MatrixXd(y.size(), 0))) added.push_back(fit.Make());
+  std::vector<std::pair<double, size_t>> ranked;  // by what is left of y
+  std::vector<VectorXd> wrenches;
+  for (const Body& body : bodies) {
+    MatrixXd both(y.size(), 6);
+    both << body.force->columns, body.moment->columns;
+    wrenches.push_back(SolveLeastSquares(both, y));
+    ranked.emplace_back((y - both * wrenches.back()).squaredNorm(), ranked.size());
   }
-  std::move(added.begin(), added.end(), std::back_inserter(*candidates));
+  std::ranges::sort(ranked);
+  std::vector<Candidate> added;
+  for (const auto& [left, index] : ranked) {
+    const Body& body = bodies[index];
+    const Vector3d force = wrenches[index].head<3>();
+    if (added.size() == kMostBodies || left > (1.0 - kPointExplains) * y.squaredNorm() ||
+        SearchLimit::IsOver())
+      break;
+    if (force.isZero(0.0)) continue;
+    const ForceAtPoint start{body.force->place, force,
+                             body.turns.front().transpose() * CalcArm(wrenches[index]), body.within};
+    if (const auto found = Improve(y, body, start, reach, MatrixXd(y.size(), 0)))
+      added.push_back(MakeCandidate(body, found->point));
+  }
+  std::ranges::move(added, std::back_inserter(*candidates));
 }
 
 Candidate MakeForceAtPoint(const ForceAtPoint& force, const std::vector<Turns>& turns,
-                           const std::vector<Candidate>& candidates) {
+                           std::span<const Candidate> candidates) {
   return MakeCandidate(FindBody(turns, candidates, force), force.point);
+}
+
+std::optional<Candidate> MakeForceOfWrench(const std::string& place, const VectorXd& wrench,
+                                           const StepRange& within, Eigen::Index step, double reach,
+                                           const std::vector<Turns>& turns,
+                                           std::span<const Candidate> candidates) {
+  if (wrench.head<3>().isZero(0.0)) return std::nullopt;
+  const Body body = FindBody(turns, candidates, {place, {}, {}, within});
+  const Vector3d point = body.turns[static_cast<size_t>(step)].transpose() * CalcArm(wrench);
+  if (!(point.norm() < reach)) return std::nullopt;
+  return MakeCandidate(body, point);
 }
 
 std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Turns>& turns, double reach,
                                         const ForceAtPoint& start, const MatrixXd& beside,
-                                        const std::vector<Candidate>& candidates) {
-  const Body body = FindBody(turns, candidates, start);
-  PointFit fit(y, body);
-  fit.Start(start);
-  if (!fit.Improve(reach, beside)) return std::nullopt;
-  return fit.force();
+                                        std::span<const Candidate> candidates) {
+  return Improve(y, FindBody(turns, candidates, start), start, reach, beside);
 }
 
 MatrixXd CalcCenterColumns(const std::string& place, const Vector3d& d, double more,
                            std::span<const Candidate> candidates) {
-  const auto find = [&](const char* fault) -> const Candidate& {
-    return *std::ranges::find_if(
-        candidates, [&](const Candidate& one) { return one.fault == fault && one.place == place; });
-  };
-  const double nominal = find("mass").nominal, mass = nominal + more;
+  const double nominal = FindCandidate(candidates, "mass", place).nominal, mass = nominal + more;
   const Vector3d m_d = mass * d, half = 0.5 * m_d;
   Eigen::Matrix<double, 6, 3> B;
   B.topRows<3>() = m_d.transpose().replicate<3, 1>();
   B.diagonal().setZero();
   B.bottomRows<3>() << -half[1], -half[0], 0.0, -half[2], 0.0, -half[0], 0.0, -half[2], -half[1];
-  const MatrixXd& all = find(force_fault::kCenter).columns;
+  const MatrixXd& all = FindCandidate(candidates, kCenter, place).columns;
   return mass / nominal * all.leftCols<3>() + all.rightCols<6>() * B;
 }
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "harness/diagnosis/cause_estimator.h"
@@ -27,6 +28,12 @@ struct ForceAtPoint {
   StepRange within;
 };
 
+/// The candidate of that fault at that place, of which there is one.
+const Candidate& FindCandidate(std::span<const Candidate> candidates, std::string_view fault,
+                               std::string_view place);
+/// The arm, across the force, of a force and a moment (6).
+Vector3d CalcArm(const Eigen::Ref<const VectorXd>& wrench);
+
 /// Adds a force that keeps its direction in the world and acts at a point of a body, for those bodies of
 /// which one explains most of y. The point is where it explains most, found by Gauss-Newton steps.
 /// @param turns of each step. @param reach how far from the centre of mass it may be, m.
@@ -36,14 +43,19 @@ void AddForcesAtPoints(const VectorXd& y, const std::vector<Turns>& turns, doubl
 
 /// One of those whose point is known.
 Candidate MakeForceAtPoint(const ForceAtPoint& force, const std::vector<Turns>& turns,
-                           const std::vector<Candidate>& candidates);
+                           std::span<const Candidate> candidates);
+/// One that has a force and moment (6, world axes) at a step; none where no point of the body has it.
+std::optional<Candidate> MakeForceOfWrench(const std::string& place, const VectorXd& wrench,
+                                           const StepRange& within, Eigen::Index step, double reach,
+                                           const std::vector<Turns>& turns,
+                                           std::span<const Candidate> candidates);
 
 /// Returns the force and its point beside other faults. @param start the first guess. @param beside columns
 /// of the others.
 /// @returns none where there is no such point.
 std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Turns>& turns, double reach,
                                         const ForceAtPoint& start, const MatrixXd& beside,
-                                        const std::vector<Candidate>& candidates);
+                                        std::span<const Candidate> candidates);
 
 /// Columns of a centre of mass at `place` that is about d (m) off: by d it changes the inertia about the old
 /// one by b(d, d), b(d, e) = m (d^T e 1 - (d e^T + e d^T) / 2), and those of d_k get b(d, e_k).

@@ -239,7 +239,17 @@ void ForceProblem::AddProfiles() {
     Candidate one = candidates_[candidate];
     one.columns = Mask(std::move(one.columns), within);
     one.parameters += 1;
-    if (one.fault == "force and moment") AddPointProfile(one, within, jump);
+    if (one.fault == "force and moment") {
+      const Index rows = forces_->rows(), begin = steps_.begins[jump];
+      const MatrixXd columns = candidates_[candidate].columns.middleRows(begin * rows, rows);
+      const VectorXd wrench = SolveLeastSquares(columns, CalcChange(jump));
+      if (auto point =
+              MakeForceOfWrench(one.place, wrench, within, begin, forces_->reach(), turns_, candidates_)) {
+        point->parameters += 1;
+        candidates_.push_back(*std::move(point));
+        within_.push_back(within);
+      }
+    }
     candidates_.push_back(std::move(one));
     within_.push_back(within);
   };
@@ -254,26 +264,6 @@ void ForceProblem::AddProfiles() {
           add(candidate, {begin, steps_.begins[later]}, j);
     }
   }
-}
-
-void ForceProblem::AddPointProfile(const Candidate& both, const StepRange& within, size_t jump) {
-  const Index rows = forces_->rows(), begin = steps_.begins[jump];
-  const auto whole = std::ranges::find_if(
-      candidates_, [&](const Candidate& one) { return one.fault == both.fault && one.place == both.place; });
-  const VectorXd a = SolveLeastSquares(whole->columns.middleRows(begin * rows, rows), CalcChange(jump));
-  const Vector3d F = a.head<3>();
-  if (!(F.squaredNorm() > 0.0)) return;
-  const auto body = std::ranges::find_if(
-      candidates_, [&](const Candidate& one) { return one.fault == kForce && one.place == both.place; });
-  const auto index = std::ranges::count_if(candidates_.begin(), body,
-                                           [](const Candidate& one) { return one.fault == kForce; });
-  const Matrix3d& R = turns_[static_cast<size_t>(begin)][static_cast<size_t>(index)];
-  const Vector3d p = R.transpose() * F.cross(Vector3d(a.tail<3>())) / F.squaredNorm();
-  if (!(p.norm() < forces_->reach())) return;
-  Candidate point = MakeForceAtPoint({both.place, F, p, within}, turns_, candidates_);
-  point.parameters += 1;
-  candidates_.push_back(std::move(point));
-  within_.push_back(within);
 }
 
 void ForceProblem::AddGrowing() {
@@ -412,14 +402,11 @@ bool ForceProblem::IsOneBody(const CauseTerm& term) const {
   const Candidate& one = candidates_[term.candidate];
   if ((one.fault != kCenter && one.fault != "payload") || !term.error.allFinite()) return true;
   if (one.fault == "payload") return IsPossibleLoad(term.amplitude, term.error);
-  const auto find = [&](const char* fault) {
-    return std::ranges::find_if(candidates_, [&](const Candidate& other) {
-      return other.fault == fault && other.place == one.place;
-    });
-  };
+  const double mass = FindCandidate(candidates_, "mass", one.place).nominal;
   const Vector6d beyond =
-      term.amplitude.tail<6>() - ToEntries(CalcPointInertia(find("mass")->nominal, term.amplitude.head<3>()));
-  return (find("inertia")->columns * beyond).norm() <= kBeyond * std::sqrt(static_cast<double>(y_.size()));
+      term.amplitude.tail<6>() - ToEntries(CalcPointInertia(mass, term.amplitude.head<3>()));
+  return (FindCandidate(candidates_, "inertia", one.place).columns * beyond).norm() <=
+         kBeyond * std::sqrt(static_cast<double>(y_.size()));
 }
 
 CauseSelection ForceProblem::SelectPlain() {

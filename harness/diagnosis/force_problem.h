@@ -61,8 +61,6 @@ class ForceProblem {
   [[nodiscard]] std::vector<size_t> RankAt(size_t jump) const;
   /// Zeroes columns outside of the rows in which a candidate acts.
   [[nodiscard]] MatrixXd Mask(MatrixXd columns, const StepRange& within) const;
-  /// Adds a force at the point of a body that explains what changes at a jump.
-  void AddPointProfile(const Candidate& both, const StepRange& within, size_t jump);
   /// The change of the residual at a jump, over its noise.
   [[nodiscard]] VectorXd CalcChange(size_t jump) const;
   /// Describes when a term acts.

@@ -106,10 +106,8 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& amplitude, cons
     if (candidate.fault == kForceAtPoint)
       fault.detail += " at " + ShowVector(R_Li * candidate.fitted) + " m of its centre of mass";
     if (candidate.fault == kForceAtPointInAxes) {
-      const Vector3d f = a.head<3>();
       fault.fault = kForceAtPoint;
-      fault.detail += " in its axes, at " + ShowVector(f.cross(Vector3d(a.tail<3>())) / f.squaredNorm()) +
-                      " m of its centre of mass";
+      fault.detail += " in its axes, at " + ShowVector(CalcArm(a)) + " m of its centre of mass";
     }
     if (candidate.fault == "force and moment") fault.detail += " and " + ShowVector(a.tail<3>()) + " N m";
   }
