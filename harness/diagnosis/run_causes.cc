@@ -4,11 +4,16 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
+#include <tuple>
 
+#include "controller/common/text.h"
+#include "harness/checks/step_analysis.h"
 #include "harness/diagnosis/force_steps.h"
 #include "harness/diagnosis/model_causes.h"
 #include "harness/diagnosis/search_limit.h"
 #include "harness/diagnosis/signal_causes.h"
+#include "harness/diagnosis/telling.h"
 
 namespace dexcheck {
 namespace {
@@ -132,6 +137,179 @@ Causes ExplainRun(const StepStore& store, double void_from, const SearchOptions&
   std::stable_sort(causes.begin(), causes.end(),
                    [](const Explanation& a, const Explanation& b) { return a.channel < b.channel; });
   return causes;
+}
+
+namespace {
+
+using Eigen::Index;
+
+// Rounding of a distance, m, and of how the nearest point moves when a radius changes. A mismatch that is
+// hardly more says nothing.
+constexpr double kDistanceNoise = 1e-14, kFaintest = 1e-12;
+constexpr double kRadiusAccuracy = 1e-4;
+// The residual may be this fraction of what there was.
+constexpr double kExplainsDistance = 0.99;
+
+/// A body whose contacts come nearer by d when it is larger by d: a fingertip, or the object for all of them.
+std::vector<Candidate> ListShapes(const Setup& setup, Index tips, Index steps, double noise) {
+  std::vector<Candidate> candidates;
+  for (Index i = 0; i < tips; ++i) {
+    const int tip = setup.fingertips()[static_cast<size_t>(i)];
+    MatrixXd column = MatrixXd::Zero(tips, steps);
+    column.row(i).setConstant(-1.0 / noise);
+    candidates.push_back({.fault = "radius",
+                          .place = "fingertip " + setup.model().frames()[static_cast<size_t>(tip)].name,
+                          .unit = "m",
+                          .nominal = setup.model().tip_radius(tip),
+                          .columns = column.reshaped()});
+  }
+  candidates.push_back({.fault = "surface further out by",
+                        .place = "object " + setup.object().name,
+                        .unit = "m",
+                        .columns = VectorXd::Constant(tips * steps, -1.0 / noise)});
+  return candidates;
+}
+
+}  // namespace
+
+Causes ExplainGeometry(const StepStore& store) {
+  constexpr double kRounding = 1e-10;  // m and rad
+  Causes causes;
+  for (const StepStore::Misplaced& one : store.misplaced()) {
+    // A wheel of another size stands higher or lower, too.
+    const bool is_wheel = one.place.starts_with("wheel ");
+    if (is_wheel && one.offset.head<2>().norm() <= kRounding && one.turn <= kRounding) continue;
+    const double offset = one.offset.norm(), turn = RadToDeg(one.turn);
+    const std::string on = " on " + one.parent;
+    Explanation& cause = causes.emplace_back();
+    cause.channel = CauseChannel::kGeometry;
+    cause.from = one.from;
+    cause.fraction = 1.0;
+    Fault fault{"turned" + on + " by", one.place, turn, 0.0, "deg", ""};
+    if (offset > kRounding) {
+      fault.fault = "off its place" + on + " by";
+      fault.value = offset, fault.unit = "m",
+      fault.detail = FormatVector((one.offset.array().abs() > kRounding).select(one.offset, 0.0), 4);
+      if (one.turn > kRounding) fault.detail += " and turned by " + FormatNumber(turn, 4) + " deg";
+    }
+    if (one.axis_turn > 0.0) {
+      const mjModel& engine = store.setup().engine();
+      const std::string joint = NameOf(engine, mjOBJ_JOINT, engine.body_jntadr[one.body]);
+      fault = {"axis turned by", "joint " + joint, RadToDeg(one.axis_turn), 0.0, "deg", ""};
+    }
+    cause.faults.push_back(fault);
+  }
+  return causes;
+}
+
+Causes ExplainContacts(const StepStore& store) {
+  const auto mismatch = store.Get(StepStore::kContactMismatch);
+  if (mismatch.size() == 0 || !(mismatch.cwiseAbs().maxCoeff() > kFaintest)) return {};
+  const double size = mismatch.cwiseAbs().maxCoeff();
+  const double noise = kDistanceNoise + kRadiusAccuracy * size;
+  const std::vector<Candidate> candidates =
+      ListShapes(store.setup(), mismatch.rows(), mismatch.cols(), noise);
+  const VectorXd y = (mismatch / noise).reshaped();
+  const CauseSelection selection =
+      SelectCauses(y, candidates, {.noise_block_size = static_cast<double>(mismatch.cols())});
+  std::vector<Index> steps(static_cast<size_t>(mismatch.cols()));
+  std::iota(steps.begin(), steps.end(), 0);
+  return DescribeSelection(StartExplanation(store, CauseChannel::kContact, steps), selection, candidates,
+                           DescribeNumber, selection.left <= 1.0 || selection.fraction >= kExplainsDistance);
+}
+
+namespace {
+
+// Part of the residual, squared, that wheels explain: those that slip do so with the load. One that is 1 %
+// too large in scenario curve explains 0.976.
+constexpr double kExplains = 0.95;
+// A wheel that is off by more of its size is none of this platform.
+constexpr double kLargestError = 0.5;
+// Noise is taken for this many times what the explanation leaves.
+constexpr double kLevel = 5.0;
+
+/// Two wheels that are off by different amounts are two faults, not one that both have and another of one.
+/// One that explains hardly anything beside another is made by a platform that tilts.
+CauseSelection SelectWheels(const VectorXd& y, std::vector<Candidate>* candidates,
+                            const CauseOptions& options) {
+  constexpr double kLeast = 0.05;  // of the fraction that the first explains
+  CauseSelection selection = SelectCauses(y, *candidates, options);
+  const auto count = std::ranges::count_if(selection.terms, [&](const CauseTerm& term) {
+    return (*candidates)[term.candidate].fault == candidates->front().fault;
+  });
+  if (count > 1 && candidates->front().place == "wheels") {
+    candidates->erase(candidates->begin());
+    selection = SelectCauses(y, *candidates, options);
+  }
+  std::vector<Candidate> kept;
+  for (const CauseTerm& term : selection.terms)
+    if (term.fraction >= kLeast * selection.terms.front().fraction)
+      kept.push_back((*candidates)[term.candidate]);
+  if (kept.size() == selection.terms.size()) return selection;
+  *candidates = kept;
+  return SelectCauses(y, *candidates, options);
+}
+
+}  // namespace
+
+Causes ExplainRolling(const StepStore& store) {
+  const Base& base = store.setup().model().base();
+  if (base.type != BaseType::kDifferentialDrive) return {};
+  const auto mismatch = store.Get(StepStore::kWheelMismatch);
+  const auto rates = store.Get(StepStore::kWheelRates);
+  const auto noise = store.Get(StepStore::kWheelNoise);
+  std::vector<Index> steps;
+  for (Index i = 0; i < store.size(); ++i)
+    if (noise(0, i) > 0.0 && noise(1, i) > 0.0) steps.push_back(i);
+  if (steps.empty()) return {};
+  const auto count = static_cast<Index>(steps.size());
+  VectorXd y(2 * count);
+  bool fails = false;  // the check
+  std::vector<Candidate> candidates;
+  for (const auto& [fault, place, nominal] : {std::tuple{"radius", "wheels", base.wheel_radius},
+                                              {"distance", "wheels", base.wheel_distance},
+                                              {"radius", base.wheel_joint_right.c_str(), base.wheel_radius},
+                                              {"radius", base.wheel_joint_left.c_str(), base.wheel_radius}}) {
+    const bool is_one = std::string_view(place) != "wheels";
+    candidates.push_back({.fault = fault,
+                          .place = is_one ? std::string("wheel ") + place : place,
+                          .unit = "m",
+                          .nominal = nominal,
+                          .columns = MatrixXd::Zero(2 * count, 1),
+                          .scale = VectorXd::Constant(1, nominal),
+                          .is_possible = [nominal = nominal](const VectorXd& a) {
+                            return std::abs(a[0]) <= kLargestError * nominal;
+                          }});
+  }
+  for (Index k = 0; k < count; ++k) {
+    const Index step = steps[static_cast<size_t>(k)];
+    const double turn = CalcRollingTwist(base, store.Get(StepStore::kVelocity).col(step))[1];
+    for (const Index wheel : {0, 1}) {
+      const Index row = 2 * k + wheel;
+      const double unit = 1.0 / noise(wheel, step);
+      const double rate = rates(wheel, step) * unit;
+      y[row] = mismatch(wheel, step) * unit;
+      fails = fails || std::abs(mismatch(wheel, step)) > noise(wheel, step) + store.rolling_bound();
+      candidates[0].columns(row, 0) = rate;
+      candidates[1].columns(row, 0) = (wheel == 0 ? -0.5 : 0.5) * turn * unit;
+      candidates[static_cast<size_t>(2 + wheel)].columns(row, 0) = rate;
+    }
+  }
+  // Slip changes with the load, in some steps.
+  constexpr double kAlike = 8.0;
+  if (y.squaredNorm() <= static_cast<double>(y.size())) return {};
+  const CauseOptions options{.most_terms = 3,
+                             .noise_block_size = std::min(kAlike, static_cast<double>(count))};
+  CauseSelection selection = SelectWheels(y, &candidates, options);
+  const bool explained = selection.fraction >= kExplains;
+  if (!explained && !fails) return {};
+  if (const double level = kLevel * selection.left; explained && level < 1.0) {
+    y /= level;
+    for (Candidate& one : candidates) one.columns /= level;
+    selection = SelectWheels(y, &candidates, options);
+  }
+  return DescribeSelection(StartExplanation(store, CauseChannel::kRolling, steps), selection, candidates,
+                           DescribeNumber, explained);
 }
 
 }  // namespace dexcheck
