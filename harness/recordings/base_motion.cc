@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 
@@ -54,97 +55,104 @@ std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueB
   return windows;
 }
 
-/// The effect of a constant acceleration of the base in a block: products of its three columns, of all
-/// joints, and with the residual.
-struct BlockProducts {
-  double from = 0.0, to = 0.0;  // s
-  Matrix3d squares = Matrix3d::Zero();
-  Vector3d products = Vector3d::Zero();
-};
+/// What a push leaves in blocks of its recording: products of its columns, of all joints, and with the
+/// residual.
+class PushProducts {
+ public:
+  using Block = TorqueBalance::Block;
 
-struct Blocks {
-  std::vector<BlockProducts> blocks;
-  double left = 0.0;  // squares of all
-};
-
-void AddPart(const TorqueRows::Part& part, double weight, const VectorXd& left, Blocks* all) {
-  for (size_t b = 0; b < all->blocks.size(); ++b) {
-    const TorqueBalance::Block& block = part.balance->blocks()[b];
-    const double count = block.counts[part.place];
-    BlockProducts& one = all->blocks[b];
-    one.from = block.from;
-    one.to = block.to;
-    if (!(count > 0.0)) continue;
-    const Vector3d x = block.gravity.row(static_cast<Index>(part.place)).transpose() *
-                       (std::sqrt(count) / block.samples / weight);
-    const double y = left[part.begin + part.within + static_cast<Index>(b)];
-    one.squares += x * x.transpose();
-    one.products += x * y;
-    all->left += y * y;
+  /// @param beside the time around the push from which blocks count, s.
+  PushProducts(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left, const Push& push,
+               double beside = std::numeric_limits<double>::infinity()) {
+    const auto recording = static_cast<size_t>(push.recording);
+    for (const Block& block : recordings[recording].fit->blocks())
+      if (block.to >= push.from - beside && block.from <= push.to + beside) sums_.push_back({&block, {}, {}});
+    for (const TorqueRows::Part& part : rows.parts)
+      for (Sums& one : sums_) {
+        if (part.recording != recording) break;
+        const auto b = static_cast<size_t>(one.block - part.balance->blocks().data());
+        const Eigen::RowVectorXd x = CalcPushColumns(recordings, push, part, b);
+        const double y = left[part.begin + part.within + static_cast<Index>(b)];
+        if (one.products.size() == 0)
+          one.squares = MatrixXd::Zero(x.size(), x.size()), one.products = VectorXd::Zero(x.size());
+        one.squares += x.transpose() * x;
+        one.products += y * x.transpose();
+        left_ += y * y;
+      }
   }
-}
 
-Blocks MakeBlocks(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
-                  size_t recording) {
-  Blocks all;
-  if (recordings.model().base().type != BaseType::kFixed) return all;
-  all.blocks.resize(recordings[recording].fit->blocks().size());
-  for (const TorqueRows::Part& part : rows.parts)
-    if (part.recording == recording)
-      AddPart(part, recordings[recording].weight[static_cast<Index>(part.place)], left, &all);
-  return all;
-}
-
-/// Squares of the residual that accelerations of this frequency explain.
-double CalcExplained(const std::vector<BlockProducts>& blocks, double frequency) {
-  Matrix6d G = Matrix6d::Zero();
-  Vector6d b = Vector6d::Zero();
-  for (const BlockProducts& one : blocks) {
-    const Vector2d phase(std::sin(0.5 * frequency * (one.from + one.to)),
-                         std::cos(0.5 * frequency * (one.from + one.to)));
-    for (int i = 0; i < 2; ++i) {
-      b.segment<3>(3 * i) += phase[i] * one.products;
-      for (int k = 0; k < 2; ++k) G.block<3, 3>(3 * i, 3 * k) += phase[i] * phase[k] * one.squares;
+  /// Squares of the residual.
+  [[nodiscard]] double left() const { return left_; }
+  /// Squares of it that a push explains whose size is a sum of such shapes in time, by their means in a
+  /// block.
+  [[nodiscard]] double CalcExplained(const std::function<VectorXd(const Block&)>& shapes) const {
+    MatrixXd G;
+    VectorXd b;
+    for (const Sums& one : sums_) {
+      const VectorXd shape = shapes(*one.block);
+      const Index width = one.products.size();
+      if (b.size() == 0) G.setZero(shape.size() * width, shape.size() * width), b.setZero(G.cols());
+      for (Index i = 0; i < shape.size(); ++i) {
+        if (shape[i] == 0.0) continue;
+        b.segment(i * width, width) += shape[i] * one.products;
+        for (Index k = 0; k < shape.size(); ++k)
+          G.block(i * width, k * width, width, width) += shape[i] * shape[k] * one.squares;
+      }
     }
+    return b.dot(SolveLeastSquares(G, b));
   }
-  return b.dot(SolveLeastSquares(G, b));
-}
+
+ private:
+  struct Sums {
+    const Block* block;
+    MatrixXd squares;
+    VectorXd products;
+  };
+  std::vector<Sums> sums_;
+  double left_ = 0.0;
+};
 
 constexpr double kFraction = 0.2;  // of the residual, that makes a motion of the base worth a look
 
 }  // namespace
 
 double FindShaking(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left) {
-  const Blocks all = MakeBlocks(recordings, rows, left, 0);
-  if (all.blocks.empty()) return 0.0;
+  const std::vector<TorqueBalance::Block>& blocks = recordings[0].fit->blocks();
+  if (recordings.model().base().type != BaseType::kFixed || blocks.empty()) return 0.0;
   constexpr double kFewestCycles = 3.0, kMostOfCycle = 0.3, kGrid = 0.2;
-  const double length = all.blocks.back().to - all.blocks.front().from;
-  double longest = length / static_cast<double>(all.blocks.size());
-  for (const BlockProducts& one : all.blocks) longest = std::max(longest, one.to - one.from);
+  const double length = blocks.back().to - blocks.front().from;
+  double longest = length / static_cast<double>(blocks.size());
+  for (const TorqueBalance::Block& one : blocks) longest = std::max(longest, one.to - one.from);
   const double cycle = 2.0 * kPi / length;
   const double begin = kFewestCycles * cycle, end = kMostOfCycle * 2.0 * kPi / longest;
   if (!(begin < end)) return 0.0;
-  const auto explained = [&](double frequency) { return CalcExplained(all.blocks, frequency); };
+  const PushProducts accelerations(recordings, rows, left, {});
+  const auto explained = [&](double frequency) {
+    return accelerations.CalcExplained([frequency](const TorqueBalance::Block& block) {
+      return Vector2d(std::sin(frequency * block.centre()), std::cos(frequency * block.centre()));
+    });
+  };
   const double best = FindMost(explained, begin, end, kGrid * cycle);
-  return explained(best) > kFraction * all.left ? best : 0.0;
+  return explained(best) > kFraction * accelerations.left() ? best : 0.0;
 }
 
 /// Since when.
 static std::optional<double> FindStep(const RecordingSet& recordings, const TorqueRows& rows,
                                       const VectorXd& left, size_t recording) {
-  const Blocks all = MakeBlocks(recordings, rows, left, recording);
-  std::optional<double> best;
-  double most = kFraction * all.left;
-  Matrix3d G = Matrix3d::Zero();
-  Vector3d b = Vector3d::Zero();
+  if (recordings.model().base().type != BaseType::kFixed) return std::nullopt;
+  const std::vector<TorqueBalance::Block>& blocks = recordings[recording].fit->blocks();
+  const PushProducts accelerations(recordings, rows, left, {.recording = static_cast<int>(recording)});
+  const auto explained = [&](double from) {
+    return accelerations.CalcExplained([from](const TorqueBalance::Block& block) {
+      return VectorXd::Constant(1, block.from >= from ? 1.0 : 0.0);
+    });
+  };
   // An acceleration that holds nearly all the time is gravity.
-  for (size_t i = all.blocks.size(); i-- > 1 + all.blocks.size() / 10;) {
-    G += all.blocks[i].squares;
-    b += all.blocks[i].products;
-    const double explained = b.dot(SolveLeastSquares(G, b));
-    if (explained > most) most = explained, best = all.blocks[i].from;
-  }
-  return best;
+  const double begin = blocks[blocks.size() / 10].to, end = blocks.back().from,
+               least = kFraction * accelerations.left();
+  const double best =
+      FindMost(explained, begin, end, (end - begin) / static_cast<double>(blocks.size()), least, 0);
+  return explained(best) > least ? std::optional(best) : std::nullopt;
 }
 
 std::vector<Push> FindPushes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
@@ -209,39 +217,19 @@ std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<i
 }
 
 Push FindTimes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left, Push push) {
-  std::vector<const TorqueBalance::Block*> blocks;
-  std::vector<Eigen::RowVectorXd> columns;
-  std::vector<double> y;
   constexpr double kBeside = 0.5;  // s: what is held out may hide an end
   const std::vector<TorqueBalance::Block>& all =
       recordings[static_cast<size_t>(push.recording)].fit->blocks();
   // The rest of a stuck torque passes through zero, so that it stands out for a part of the time.
   const double beside = push.is_stuck ? all.back().to - all.front().from : push.reach + kBeside;
-  for (const TorqueRows::Part& part : rows.parts) {
-    if (part.recording != static_cast<size_t>(push.recording)) continue;
-    for (size_t b = 0; b < part.balance->blocks().size(); ++b) {
-      const TorqueBalance::Block& block = part.balance->blocks()[b];
-      if (block.to < push.from - 2.0 * beside || block.from > push.to + 2.0 * beside) continue;
-      const Eigen::RowVectorXd own = CalcPushColumns(recordings, push, part, b);
-      if (own.isZero(0.0)) continue;
-      blocks.push_back(&block);
-      columns.push_back(own);
-      y.push_back(left[part.begin + part.within + static_cast<Index>(b)]);
-    }
-  }
-  if (blocks.empty()) return push;
+  const PushProducts products(recordings, rows, left, push, 2.0 * beside);
   const auto explained = [&](double from, double to) {
-    const Index width = columns.front().size();
-    MatrixXd G = MatrixXd::Zero(width, width);
-    VectorXd b = VectorXd::Zero(width);
-    for (size_t i = 0; i < blocks.size() && from < to; ++i) {
-      const double share = CalcShare({.from = from, .to = to, .reach = push.reach}, *blocks[i]);
-      if (share == 0.0) continue;
-      G.noalias() += share * share * columns[i].transpose() * columns[i];
-      b += share * y[i] * columns[i].transpose();
-    }
-    return b.dot(SolveLeastSquares(G, b));
+    return products.CalcExplained([&](const TorqueBalance::Block& block) {
+      return VectorXd::Constant(
+          1, from < to ? CalcShare({.from = from, .to = to, .reach = push.reach}, block) : 0.0);
+    });
   };
+  if (!(explained(push.from, push.to) > 0.0)) return push;
   constexpr double kGrid = 0.2, kSteps = 200.0;
   const double step = std::max(kGrid * push.reach, beside / kSteps);
   for (int twice = 0; twice < 2; ++twice) {
