@@ -113,7 +113,7 @@ bool CauseDescription::AddWholeNumbers(FoundFault* found, Fault* shown) const {
 }
 
 double CauseDescription::ShapeVelocityOf(const TorqueFault& fault, const VectorXd& a) const {
-  const double v = set_[0].shape_velocities(fault.index, fault.sums.front().front().column.component);
+  const double v = set_[0].motion.shape_velocities(fault.index, fault.sums.front().front().column.component);
   return a.size() == 1 ? v : v * std::sqrt(kFineRatio) * std::exp(a[1] / a[0]);
 }
 

@@ -34,7 +34,7 @@ MotionFit::MotionFit(const RobotModel& model, Recording* recording, size_t ahead
   Analyse();
   // Logs have zeros where a drive reports no torque.
   std::erase_if(judged_, [&](int joint) {
-    return moves_[static_cast<size_t>(joint)] && noise_.torque[joint] == 0.0 &&
+    return facts_.moves[static_cast<size_t>(joint)] && facts_.torque[joint] == 0.0 &&
            sample_.most_torque[joint] == 0.0;
   });
 }
@@ -102,7 +102,7 @@ bool MotionFit::Fill() {
         ++held_;
         continue;
       }
-      if (step_ > 0.0 && passed > kGap * step_) ++segment_, ++gaps_;
+      if (facts_.step > 0.0 && passed > kGap * facts_.step) ++segment_, ++gaps_;
     }
     last_ = row;
     rows_ahead_.push_back(row);
@@ -147,13 +147,13 @@ MatrixXd MotionFit::CalcCoefficients(size_t centre, size_t half, int order) cons
   const int time = ChannelOf(RecordedQuantity::kTime, -1);
   const double t = rows_ahead_[centre][time];
   const auto m = static_cast<Eigen::Index>(2 * half + 1);
-  const double scale = static_cast<double>(half) * step_;
+  const double scale = static_cast<double>(half) * facts_.step;
   // Equally spaced rows have the same coefficients everywhere.
   constexpr double kEven = 1e-3;
   bool is_even = true;
   for (size_t k = 0; k <= 2 * half && is_even; ++k) {
-    const double expected = (static_cast<double>(k) - static_cast<double>(half)) * step_;
-    is_even = std::abs(rows_ahead_[centre - half + k][time] - t - expected) < kEven * step_;
+    const double expected = (static_cast<double>(k) - static_cast<double>(half)) * facts_.step;
+    is_even = std::abs(rows_ahead_[centre - half + k][time] - t - expected) < kEven * facts_.step;
   }
   MatrixXd& even = even_[{half, order}];
   if (is_even && even.size() > 0) return even;
@@ -218,12 +218,12 @@ void MotionFit::AverageFriction(int joint, const VectorXd& times, const VectorXd
   auto shapes = sample_.friction.row(joint);
   shapes.setZero();
   double direction = 0.0, slip = 0.0, first = 0.0, slowest = std::numeric_limits<double>::infinity();
-  const double rest = noise_.rest[joint];
+  const double rest = facts_.rest[joint];
   const bool moves = std::abs(sample_.qd[joint]) >= rest;
   for (Eigen::Index k = 0; k < times.size() && moves; ++k) {
     double v = 0.0;
     for (Eigen::Index p = rate.size(); p-- > 0;) v = v * times[k] + rate[p];
-    FrictionRow here = CalcFrictionShapes(v, shape_velocities_.row(joint));
+    FrictionRow here = CalcFrictionShapes(v, facts_.shape_velocities.row(joint));
     const double sign = here[kSlipShape];
     slip = k > 0 ? CalcSlip(sign, slip, std::abs(v) * (times[k] - times[k - 1])) : sign;
     here[kSlipShape] = slip;
@@ -291,7 +291,7 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
             : VectorXd(fitted.col(position).tail<kOrder>().cwiseProduct(Eigen::Vector4d(1.0, 2.0, 3.0, 4.0)));
     sample_.jerk[joint] = velocity >= 0 ? 2.0 * fitted(2, velocity) : 6.0 * fitted(3, position);
     sample_.snap[joint] = velocity >= 0 ? 6.0 * fitted(3, velocity) : 24.0 * fitted(4, position);
-    if (stands_)
+    if (facts_.stands)
       for (VectorXd* const each : {&sample_.qd, &sample_.qdd, &sample_.jerk, &sample_.snap})
         (*each)[joint] = 0.0;
     AverageFriction(joint, times, rate, C.row(0).transpose());
@@ -300,7 +300,7 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
     sample_.torque[joint] = fitted(0, torque);
     if (const auto limit = refinements_.limits.find(joint); limit != refinements_.limits.end())
       sample_.beyond[joint] =
-          (window.col(torque).array().abs() > limit->second - kMostNoisy * noise_.torque[joint])
+          (window.col(torque).array().abs() > limit->second - kMostNoisy * facts_.torque[joint])
               .cast<double>()
               .mean();
     sample_.torque_rate[joint] = CalcTorqueRate(joint, centre, fitted.col(torque));
@@ -316,7 +316,7 @@ void MotionFit::CalcSpeeds() {
   const Eigen::Index n = model_->num_joints();
   VectorXd squares = VectorXd::Zero(n), moving = VectorXd::Zero(n);
   VectorXd lowest = VectorXd::Constant(n, std::numeric_limits<double>::infinity()), highest = -lowest;
-  shape_velocities_ = ListShapeVelocities(VectorXd::Ones(n));
+  facts_.shape_velocities = ListShapeVelocities(VectorXd::Ones(n));
   double count = 0.0;
   for (const size_t centre : ListCentres(CalcReach())) {
     Emit(centre, [&](const RecordedSample& sample) {
@@ -329,28 +329,29 @@ void MotionFit::CalcSpeeds() {
     count += 1.0;
   }
   const VectorXd speeds = (squares / std::max(1.0, count)).cwiseSqrt();
-  shape_velocities_ = ListShapeVelocities(speeds, refinements_.stribeck, refinements_.smooth);
+  facts_.shape_velocities = ListShapeVelocities(speeds, refinements_.stribeck, refinements_.smooth);
   // A joint that friction holds moves far at few times where joints move one after another.
   constexpr double kSlow = 2e-3, kMoving = 0.2, kMovingFar = 0.02, kFar = 0.02;
   constexpr double kHeld = 2e-3;  // rad or m, that a joint gives under its friction
-  noise_.rest = noise_.rest.cwiseMax(kSlow * speeds);
+  facts_.rest = facts_.rest.cwiseMax(kSlow * speeds);
   for (int joint = 0; joint < n; ++joint) {
     const double least = model_->joint(joint).dry_friction > 0.0 ? kHeld : 0.0;
     const double span = highest[joint] - lowest[joint];
     const bool moves_far = least > 0.0 && span > kFar;
-    moves_.push_back(moving[joint] > (moves_far ? kMovingFar : kMoving) * count && span > least);
+    facts_.moves.push_back(moving[joint] > (moves_far ? kMovingFar : kMoving) * count && span > least);
   }
 }
 
 std::vector<bool> MotionFit::IsJudged(const RecordedSample& sample) const {
-  std::vector<bool> judged(moves_.size());
+  std::vector<bool> judged(facts_.moves.size());
   // A torque that reaches its limit within a window is neither the one nor the other.
   constexpr double kFew = 0.02;
   for (size_t joint = 0; joint < judged.size(); ++joint) {
     const auto at = static_cast<Eigen::Index>(joint);
     const bool has_friction = model_->joint(static_cast<int>(joint)).dry_friction > 0.0;
-    const bool slides = has_friction ? sample.slowest[at] >= noise_.rest[at] : sample.direction[at] != 0.0;
-    judged[joint] = (!moves_[joint] || slides) && std::min(sample.beyond[at], 1.0 - sample.beyond[at]) < kFew;
+    const bool slides = has_friction ? sample.slowest[at] >= facts_.rest[at] : sample.direction[at] != 0.0;
+    judged[joint] =
+        (!facts_.moves[joint] || slides) && std::min(sample.beyond[at], 1.0 - sample.beyond[at]) < kFew;
   }
   return judged;
 }
@@ -385,18 +386,18 @@ std::vector<std::string> MotionFit::ListNotes() const {
     note(count, "times the position of " + model_->joint(joint).name +
                     " passes from one end of a turn to the other: unwrapped");
   std::vector<double> lags;
-  for (const auto& [joint, lag] : velocity_lags_) lags.push_back(lag / step_);
+  for (const auto& [joint, lag] : velocity_lags_) lags.push_back(lag / facts_.step);
   if (!lags.empty())
     notes.push_back(
         fmt::format("{}: velocities are {:.2g} rows {} than positions: accelerations are those at the "
                     "positions' times",
                     recording_->name, std::abs(Median(lags)), Median(lags) > 0.0 ? "earlier" : "later"));
-  if (stands_) notes.push_back(recording_->name + ": the robot stands: torques alone are compared");
-  note(gaps_, fmt::format("gaps longer than {:.3g} s: nothing is smoothed across them", kGap * step_));
+  if (facts_.stands) notes.push_back(recording_->name + ": the robot stands: torques alone are compared");
+  note(gaps_, fmt::format("gaps longer than {:.3g} s: nothing is smoothed across them", kGap * facts_.step));
   notes.push_back(fmt::format(
       "{}: {} from {} by polynomials over {:.3g} s (a row every {:.3g} s)", recording_->name,
       recording_->Has(RecordedQuantity::kVelocity) ? "accelerations" : "velocities and accelerations",
-      recording_->Has(RecordedQuantity::kVelocity) ? "velocities" : "positions", window(), step_));
+      recording_->Has(RecordedQuantity::kVelocity) ? "velocities" : "positions", window(), facts_.step));
   return notes;
 }
 

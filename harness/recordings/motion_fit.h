@@ -52,8 +52,8 @@ struct RecordedSample {
   Vector2d swing = Vector2d::Zero();  ///< Sine and cosine of a base that shakes, averaged.
 };
 
-/// Standard deviations, by joint.
-struct MotionNoise {
+/// A recording's noise, as standard deviations by joint, and how it moves and is sampled.
+struct MotionFacts {
   VectorXd position, velocity, torque;  ///< Of a single number.
   VectorXd smooth_position, smooth_torque,
       acceleration;           ///< Of a sample, the last with what smoothing leaves out.
@@ -61,6 +61,12 @@ struct MotionNoise {
   double base = 0.0;          ///< Of a sample: the base's acceleration with gravity, m/s^2.
   VectorXd rest;              ///< Velocity below which a joint is at rest.
   bool is_quantised = false;  ///< The steps of an encoder are much of some position's noise.
+  std::vector<bool> moves;    ///< By joint: whether it moves, and farther than its dry friction may hold it.
+  MatrixXd inertia;           ///< Root mean square of the entries of M_bar'.
+  /// Velocities of the shapes of friction, by the root mean square of the joints' velocities.
+  MatrixXd shape_velocities;
+  bool stands = false;  ///< No joint moves, in all of the recording.
+  double step = 0.0;    ///< Median time between rows, s.
 };
 
 /// Reads a recording once, in constant memory. Rows whose times are doubled are left out, so are those that
@@ -80,26 +86,18 @@ class MotionFit {
 
   /// Faults of the recording itself: velocities, lost samples, jumps.
   [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
-  [[nodiscard]] const MotionNoise& noise() const { return noise_; }
+  [[nodiscard]] const MotionFacts& facts() const { return facts_; }
   /// Joints with a position and a torque or current.
   [[nodiscard]] const std::vector<int>& joints() const { return judged_; }
-  /// By joint: whether it moves, and farther than its dry friction may hold it.
-  [[nodiscard]] const std::vector<bool>& moves() const { return moves_; }
   /// By joint: whether a sample says what moves it. Where friction holds a joint that moves at other times,
   /// it does not; nor does it where a joint of which dry friction is known turns or rests within a window.
   [[nodiscard]] std::vector<bool> IsJudged(const RecordedSample& sample) const;
-  /// Velocities of the shapes of friction, by the root mean square of the joints' velocities.
-  [[nodiscard]] const MatrixXd& shape_velocities() const { return shape_velocities_; }
   [[nodiscard]] const VectorXd& most_torque() const { return sample_.most_torque; }
-  /// Root mean square of the entries of M_bar'.
-  [[nodiscard]] const MatrixXd& inertia() const { return inertia_; }
   [[nodiscard]] bool has_currents() const { return has_currents_; }
-  [[nodiscard]] double step() const { return step_; }  ///< Median time between rows, s.
   [[nodiscard]] double window() const {
-    return 2.0 * static_cast<double>(half_) * step_;
+    return 2.0 * static_cast<double>(half_) * facts_.step;
   }  ///< That is smoothed over, s.
   [[nodiscard]] long rows() const { return rows_; }
-  [[nodiscard]] bool stands() const { return stands_; }  ///< No joint moves, in all of the recording.
   /// Says how the rows were treated, for the report.
   [[nodiscard]] std::vector<std::string> ListNotes() const;
   /// Whether velocities were recorded up to two rows before or after positions.
@@ -168,7 +166,6 @@ class MotionFit {
   Recording* recording_;
   TorqueRegressor regressor_;
   Refinements refinements_;
-  MatrixXd shape_velocities_;
   size_t part_;  // rows that are read at once
   std::vector<int> judged_;
   std::vector<Fault> faults_;
@@ -183,15 +180,12 @@ class MotionFit {
   std::map<std::pair<int, RecordedQuantity>, long> wrong_;  // by joint: samples that were replaced
   VectorXd jumps_;                                          // by channel: added to later rows
   std::map<int, double> velocity_lags_;  // by joint: how much later than its velocity its position is, s
-  bool stands_ = false;
   long segment_ = 0, rows_ = 0, held_ = 0, held_run_ = 0, doubled_ = 0, empty_ = 0, gaps_ = 0;
   bool has_ended_ = false;
-  double step_ = 0.0, begin_ = 0.0;
+  double begin_ = 0.0;
   mutable std::map<std::pair<size_t, int>, MatrixXd> even_;  // of CalcCoefficients, by half and order
   size_t half_ = 2, stride_ = 1;
-  std::vector<bool> moves_;
-  MatrixXd inertia_;
-  MotionNoise noise_;
+  MotionFacts facts_;
   RecordedSample sample_;
 };
 

@@ -100,7 +100,7 @@ void MotionFit::UndoJumps() {
   jumps_ = VectorXd::Zero(last_.size());
   JumpOptions options{.time = ChannelOf(RecordedQuantity::kTime, -1),
                       .quanta = VectorXd::Zero(last_.size()),
-                      .step = step_,
+                      .step = facts_.step,
                       .longest_gap = kGap};
   for (Eigen::Index i = 0; i < last_.size(); ++i) {
     if (recording_->channels[static_cast<size_t>(i)].quantity != RecordedQuantity::kPosition) continue;
@@ -145,22 +145,22 @@ void MotionFit::Analyse() {
       steps.push_back(rows_ahead_[i][time] - rows_ahead_[i - 1][time]);
     return steps;
   };
-  step_ = Median(list_steps());
+  facts_.step = Median(list_steps());
   begin_ = rows_ahead_.front()[time];
   constexpr double kLongest = 0.5;
-  if (step_ > kLongest)
-    throw InputError(
-        fmt::format("{}: time: a row every {:.4g} s shows no motion; its unit may be another", name, step_));
+  if (facts_.step > kLongest)
+    throw InputError(fmt::format("{}: time: a row every {:.4g} s shows no motion; its unit may be another",
+                                 name, facts_.step));
   MeasureSteadiness();
   UndoJumps();
   const std::vector<double> steps = list_steps();
   for (size_t i = 1; i < rows_ahead_.size(); ++i) {
-    if (steps[i - 1] > kGap * step_) ++segment_, ++gaps_;
+    if (steps[i - 1] > kGap * facts_.step) ++segment_, ++gaps_;
     segments_[i] = segment_;
   }
   const Eigen::Index n = model_->num_joints();
-  for (VectorXd* vector : {&noise_.position, &noise_.velocity, &noise_.torque, &noise_.smooth_position,
-                           &noise_.smooth_torque, &noise_.acceleration, &noise_.rest, &sample_.q, &sample_.qd,
+  for (VectorXd* vector : {&facts_.position, &facts_.velocity, &facts_.torque, &facts_.smooth_position,
+                           &facts_.smooth_torque, &facts_.acceleration, &facts_.rest, &sample_.q, &sample_.qd,
                            &sample_.qdd, &sample_.jerk, &sample_.snap, &sample_.torque, &sample_.torque_rate,
                            &sample_.direction, &sample_.slowest, &sample_.beyond, &sample_.most_torque})
     *vector = VectorXd::Zero(n);
@@ -196,34 +196,34 @@ void MotionFit::Analyse() {
       const int channel = ChannelOf(quantity, joint);
       return channel < 0 ? 0.0 : sigma[channel];
     };
-    noise_.position[joint] = get(RecordedQuantity::kPosition);
+    facts_.position[joint] = get(RecordedQuantity::kPosition);
     constexpr double kMuch = 0.5;
     if (const int position = ChannelOf(RecordedQuantity::kPosition, joint); position >= 0)
-      noise_.is_quantised =
-          noise_.is_quantised ||
+      facts_.is_quantised =
+          facts_.is_quantised ||
           (sigma[position] > 0.0 && FindQuantum(position) / std::sqrt(12.0) > kMuch * sigma[position]);
-    noise_.velocity[joint] = get(RecordedQuantity::kVelocity);
-    noise_.torque[joint] = get(Effort());
+    facts_.velocity[joint] = get(RecordedQuantity::kVelocity);
+    facts_.torque[joint] = get(Effort());
     for (const Row& row : rows_ahead_)
       if (const int channel = ChannelOf(Effort(), joint); channel >= 0)
         sample_.most_torque[joint] =
-            std::max(sample_.most_torque[joint], std::abs(row[channel]) - 3.0 * noise_.torque[joint]);
+            std::max(sample_.most_torque[joint], std::abs(row[channel]) - 3.0 * facts_.torque[joint]);
   }
-  noise_.wrench = sample_.wrench = VectorXd::Zero(6 * static_cast<Eigen::Index>(recording_->wrenches.size()));
-  for (int k = 0; k < noise_.wrench.size(); ++k)
+  facts_.wrench = sample_.wrench = VectorXd::Zero(6 * static_cast<Eigen::Index>(recording_->wrenches.size()));
+  for (int k = 0; k < facts_.wrench.size(); ++k)
     if (const int channel = ChannelOf(RecordedQuantity::kWrench, k); channel >= 0)
-      noise_.wrench[k] = sigma[channel];
+      facts_.wrench[k] = sigma[channel];
   VectorXd base = VectorXd::Zero(2);
   for (int k = 0; k < 7 && recording_->Has(RecordedQuantity::kBase); ++k)
     base[k / 3 > 0 ? 1 : 0] += Square(sigma[ChannelOf(RecordedQuantity::kBase, k)]);
   CheckVelocities();
   ReportWrongSamples();
-  stands_ = Stands();
-  inertia_ = CalcInertia(centres);
+  facts_.stands = Stands();
+  facts_.inertia = CalcInertia(centres);
   ChooseWindow(centres);
   AddWrenchErrors();
   const MatrixXd C = CalcCoefficients(ListCentres(half_).front(), half_, kOrder);
-  noise_.base = 2.0 * std::sqrt(base[0] * C.row(2).squaredNorm() +
+  facts_.base = 2.0 * std::sqrt(base[0] * C.row(2).squaredNorm() +
                                 base[1] * C.row(0).squaredNorm() * model_->gravity().squaredNorm());
   CalcSpeeds();
 }
@@ -233,19 +233,19 @@ void MotionFit::AddWrenchErrors() {
   // ground gives.
   constexpr double kPlace = 1e-4;  // m
   const std::vector<size_t> centres = ListCentres(half_);
-  VectorXd errors = VectorXd::Zero(noise_.wrench.size());
+  VectorXd errors = VectorXd::Zero(facts_.wrench.size());
   for (const size_t centre : centres) {
     const MatrixXd fitted = CalcCoefficients(centre, half_, kOrder) * GetWindow(centre, half_);
     for (int k = 0; k < errors.size(); ++k) {
       const int channel = ChannelOf(RecordedQuantity::kWrench, k);
       if (channel < 0) continue;
-      errors[k] += Square(fitted(1, channel) * step_) / 12.0;
+      errors[k] += Square(fitted(1, channel) * facts_.step) / 12.0;
       if (k % 6 < 3 && ChannelOf(RecordedQuantity::kWrench, k + 3) < 0)
         errors.segment<3>(k - k % 6 + 3).array() += Square(kPlace * fitted(0, channel));
     }
   }
-  noise_.wrench =
-      (noise_.wrench.cwiseAbs2() + errors / static_cast<double>(centres.size())).cwiseSqrt().eval();
+  facts_.wrench =
+      (facts_.wrench.cwiseAbs2() + errors / static_cast<double>(centres.size())).cwiseSqrt().eval();
 }
 
 bool MotionFit::Stands() const {
@@ -255,7 +255,7 @@ bool MotionFit::Stands() const {
     if (recording_->channels[i].quantity != RecordedQuantity::kPosition) continue;
     const auto at = static_cast<Eigen::Index>(i);
     const auto [low, high] = std::ranges::minmax(rows_ahead_, {}, [at](const Row& row) { return row[at]; });
-    if (high[at] - low[at] > kLittle + kErrors * noise_.position[recording_->channels[i].joint]) return false;
+    if (high[at] - low[at] > kLittle + kErrors * facts_.position[recording_->channels[i].joint]) return false;
   }
   return !recording_->Has(RecordedQuantity::kBase);
 }
@@ -281,7 +281,7 @@ std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_
       moved[k] = moved[k - 1] + 0.5 * (window(k, time) - window(k - 1, time)) *
                                     (window(k, velocity) + window(k - 1, velocity));
     const double v = C.row(1).dot(moved);
-    const double variance = Square(noise_.position[joint]);
+    const double variance = Square(facts_.position[joint]);
     G += rates * rates.transpose();
     noise.diagonal() += variance * Vector2d(C.row(1).squaredNorm(), 4.0 * C.row(2).squaredNorm());
     b += v * rates;
@@ -312,9 +312,10 @@ std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_
   const double left = std::max(0.0, squares - x.dot(b)), error = error_of(left, 1);
   // A logger may read velocities half a step before positions, as a leapfrog has them.
   constexpr double kLeast = 0.02;  // rows
-  if (std::abs(x[1]) > std::max(kErrors * error, kLeast * step_) && std::abs(x[1]) < kLate * step_)
+  if (std::abs(x[1]) > std::max(kErrors * error, kLeast * facts_.step) &&
+      std::abs(x[1]) < kLate * facts_.step)
     velocity_lags_[joint] = x[1];
-  if (x[1] < kLate * step_ || x[1] < kErrors * error || without - left < kExplains * without)
+  if (x[1] < kLate * facts_.step || x[1] < kErrors * error || without - left < kExplains * without)
     return unless_late;
   return Fault{"velocity lag", place, x[1], error, "s", "(late or filtered)"};
 }
@@ -323,8 +324,8 @@ void MotionFit::CheckVelocities() {
   // Over a time in which noise of positions determines accelerations, too.
   constexpr double kWindow = 0.1;  // s to each side
   constexpr size_t kLeast = 8, kMost = 64;
-  const size_t half =
-      std::min(std::clamp(static_cast<size_t>(kWindow / step_), kLeast, kMost), (rows_ahead_.size() - 1) / 8);
+  const size_t half = std::min(std::clamp(static_cast<size_t>(kWindow / facts_.step), kLeast, kMost),
+                               (rows_ahead_.size() - 1) / 8);
   const std::vector<size_t> centres = half > 2 ? ListCentres(half) : std::vector<size_t>();
   size_t recorded = 0;
   std::vector<Fault> found;
@@ -374,7 +375,7 @@ void MotionFit::CheckVelocities() {
   recording_->channels = kept;
   for (Row& row : rows_ahead_) row = Row(row(columns));
   for (VectorXd* const one : {&last_, &most_alone_, &jumps_}) *one = VectorXd((*one)(columns));
-  noise_.velocity.setZero();
+  facts_.velocity.setZero();
 }
 
 MatrixXd MotionFit::CalcInertia(const std::vector<size_t>& centres) {
@@ -423,8 +424,8 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
       for (int joint = 0; joint < n; ++joint) {
         const int channel = ChannelOf(source, joint);
         if (channel < 0) continue;
-        const double sigma = source == RecordedQuantity::kPosition   ? noise_.position[joint]
-                             : source == RecordedQuantity::kVelocity ? noise_.velocity[joint]
+        const double sigma = source == RecordedQuantity::kPosition   ? facts_.position[joint]
+                             : source == RecordedQuantity::kVelocity ? facts_.velocity[joint]
                                                                      : 0.0;
         variance[joint] += Square(factorial * sigma) * C.row(derivative).squaredNorm();
         bias[joint] += Square(factorial) *
@@ -434,24 +435,24 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
     }
     const double count = static_cast<double>(centres.size());
     const VectorXd squares = (variance + bias.cwiseMax(0.0)) / count;
-    const double score = (inertia_.array().square().matrix() * squares).sum();
+    const double score = (facts_.inertia.array().square().matrix() * squares).sum();
     // A robot at rest shows torques alone, over a time as short as a push.
-    if (!(score < best) || (stands_ && std::isfinite(best))) continue;
+    if (!(score < best) || (facts_.stands && std::isfinite(best))) continue;
     best = score;
     half_ = half;
-    noise_.acceleration = squares.cwiseSqrt();
+    facts_.acceleration = squares.cwiseSqrt();
     smoothed = std::sqrt(value / count);
-    noise_.smooth_position = smoothed * noise_.position;
-    noise_.smooth_torque = smoothed * noise_.torque;
-    const VectorXd velocity = has_velocity ? VectorXd(smoothed * noise_.velocity)
-                                           : VectorXd(std::sqrt(rate / count) * noise_.position);
-    noise_.rest = 3.0 * velocity;
+    facts_.smooth_position = smoothed * facts_.position;
+    facts_.smooth_torque = smoothed * facts_.torque;
+    const VectorXd velocity = has_velocity ? VectorXd(smoothed * facts_.velocity)
+                                           : VectorXd(std::sqrt(rate / count) * facts_.position);
+    facts_.rest = 3.0 * velocity;
   }
   if (!std::isfinite(best))
     throw InputError(recording_->name + ": is too short to derive accelerations from");
-  if (stands_) noise_.acceleration.setZero();
+  if (facts_.stands) facts_.acceleration.setZero();
   stride_ = std::max<size_t>(1, half_ / 2);
-  noise_.wrench *= smoothed;
+  facts_.wrench *= smoothed;
 }
 
 }  // namespace dexcheck

@@ -66,7 +66,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   } else if (joints_ != motion.joints() || has_currents_ != motion.has_currents()) {
     throw InputError(recording->name + ": must have the quantities of " + first_name_);
   }
-  step_ = std::max(step_, motion.step());
+  step_ = std::max(step_, motion.facts().step);
   for (std::unique_ptr<TorqueBalance>* balance : {&one.fit, &one.held}) {
     *balance = std::make_unique<TorqueBalance>(*one.model, joints_, has_currents_, options.refinements);
     (*balance)->SetWrenches(recording->wrenches);
@@ -80,7 +80,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
     if (samples == 0) begin = sample.time;
     const long stretch = std::lround(std::floor((sample.time - begin) / kStretch));
     // A robot that stands is of interest only when something acts.
-    const bool is_held = stretch % kEvery == kEvery - 1 && !motion.stands();
+    const bool is_held = stretch % kEvery == kEvery - 1 && !motion.facts().stands;
     TorqueBalance& balance = is_held ? *one.held : *one.fit;
     balance.Add(sample, motion.IsJudged(sample));
     ReportSecond(options, sample.time, balance.residual());
@@ -105,13 +105,8 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
   for (const std::string& note : motion.ListNotes()) notes_.push_back(note);
   has_other_times_ = has_other_times_ || motion.has_other_times();
   for (const Fault& fault : motion.faults()) faults_.push_back(fault);
-  one.motion = motion.noise();
-  one.moves = motion.moves();
-  one.inertia = motion.inertia();
-  one.stands = motion.stands();
-  one.step = motion.step();
+  one.motion = motion.facts();
   one.reach = 0.5 * motion.window();
-  one.shape_velocities = motion.shape_velocities();
   one.most_torque = motion.most_torque();
 }
 
@@ -128,7 +123,7 @@ void RecordingSet::ReportSecond(const ReadOptions& options, double time, const V
 double RecordingSet::CalcTimeError(const ReadRecording& one) const {
   // When a torque acted is known to a row's time. All joints of a row have one time: what a joint's torque is
   // off, over how fast it changes, is at least the error of time, whatever else is wrong.
-  double error = one.step / std::sqrt(12.0);
+  double error = one.motion.step / std::sqrt(12.0);
   if (has_currents_ || joints_.size() < 2) return error;
   constexpr double kAtMost = 8.0;  // positions, velocities and torques of a row may have times of their own
   for (size_t place = 0; place < joints_.size(); ++place) {
@@ -150,14 +145,14 @@ double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
   };
   double variance = Square(one.motion.smooth_torque[joint] * gains_[static_cast<Index>(place)]);
   for (int other = 0; other < model_->num_joints(); ++other) {
-    variance += Square(one.inertia(joint, other) * one.motion.acceleration[other]);
+    variance += Square(one.motion.inertia(joint, other) * one.motion.acceleration[other]);
     variance += mean_square({TorqueColumn::kPosition, other}) * Square(one.motion.smooth_position[other]);
   }
   // An integrator may have the friction of a velocity half a row away.
   variance += mean_square({TorqueColumn::kAcceleration, joint}) *
-              Square(0.5 * one.step * model_->joint(joint).damping);
+              Square(0.5 * one.motion.step * model_->joint(joint).damping);
   // Dry friction that holds a joint is anything up to its largest value.
-  if (!one.moves[static_cast<size_t>(joint)]) variance += Square(model_->joint(joint).dry_friction);
+  if (!one.motion.moves[static_cast<size_t>(joint)]) variance += Square(model_->joint(joint).dry_friction);
   for (int k = 0; k < 3; ++k)
     variance += mean_square({TorqueColumn::kGravity, 0, k}) * Square(one.motion.base);
   if (one.motion.wrench.size() > 0)

@@ -34,17 +34,12 @@ struct UnjudgedJoint {
 struct ReadRecording {
   std::unique_ptr<RobotModel> model;
   std::unique_ptr<TorqueBalance> fit, held;
-  MotionNoise motion;
-  std::vector<bool> moves;         ///< MotionFit's, by joint.
+  MotionFacts motion;
   std::vector<bool> has_position;  ///< By joint.
-  MatrixXd inertia;
-  MatrixXd shape_velocities;  ///< MotionFit's.
-  VectorXd most_torque;       ///< RecordedSample's.
-  bool stands = false;        ///< No joint moves.
-  double step = 0.0;          ///< Between rows, s.
-  double reach = 0.0;         ///< Of smoothing, to each side, s.
-  VectorXd noise;             ///< Of a sample's balance, by judged joint, N m or N.
-  VectorXd weight;            ///< Likewise: noise, or what no cause explains.
+  VectorXd most_torque;            ///< RecordedSample's.
+  double reach = 0.0;              ///< Of smoothing, to each side, s.
+  VectorXd noise;                  ///< Of a sample's balance, by judged joint, N m or N.
+  VectorXd weight;                 ///< Likewise: noise, or what no cause explains.
 };
 
 class RecordingSet {

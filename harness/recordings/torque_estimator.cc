@@ -92,7 +92,7 @@ void TorqueEstimator::ListFaults() {
     return (recordings_->has_currents() &&
             (one.kind == TorqueFault::kTorqueGain || one.kind == TorqueFault::kSaturation ||
              one.kind == TorqueFault::kStuckTorque)) ||
-           ((*recordings_)[0].stands &&
+           ((*recordings_)[0].motion.stands &&
             (one.kind == TorqueFault::kSaturation || one.kind == TorqueFault::kStuckTorque)) ||
            IsTooFast(one);
   });
@@ -107,7 +107,8 @@ bool TorqueEstimator::IsTooFast(const TorqueFault& fault) const {
   constexpr double kRows = 8.0, kPeak = 3.0;  // MotionExtents' are peaks
   const double step = recordings_->CalcExtents().acceleration[fault.index] / kPeak * recordings_->step();
   const ReadRecording& first = (*recordings_)[0];
-  return first.shape_velocities(fault.index, fault.sums.front().front().column.component) < kRows * step;
+  return first.motion.shape_velocities(fault.index, fault.sums.front().front().column.component) <
+         kRows * step;
 }
 
 void TorqueEstimator::Select() {
