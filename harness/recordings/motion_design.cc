@@ -8,6 +8,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
+#include "controller/control/trajectory.h"
 #include "harness/plant/random_stream.h"
 #include "harness/recordings/torque_rows.h"
 
@@ -18,13 +19,6 @@ using Eigen::Index;
 
 constexpr int kSeries = 2 * SeriesMotion::kHarmonics;
 constexpr double kMargin = 0.99;  // of limits, between the instants at which they are held
-
-/// Value and two derivatives of a quintic that rises from 0 to 1.
-Vector3d Rise(double s) {
-  if (s >= 1.0) return {1.0, 0.0, 0.0};
-  return {s * s * s * (10.0 + s * (6.0 * s - 15.0)), 30.0 * s * s * (s - 1.0) * (s - 1.0),
-          60.0 * s * (1.0 + s * (2.0 * s - 3.0))};
-}
 
 /// Faults whose sizes a motion is to determine: one candidate for each number.
 std::vector<TorqueFault> ListDesignedFaults(const RobotModel& model, const std::vector<int>& joints) {
@@ -333,17 +327,16 @@ Eigen::Matrix<double, 3, 2 * SeriesMotion::kHarmonics> SeriesMotion::CalcBasis(d
   constexpr double kRamp = 0.15;    // of the duration
   constexpr double kPeriod = 10.0;  // of the first harmonic, s
   const double ramp = kRamp * duration_;
-  Vector3d rise = Rise(std::min(time, duration_ - time) / ramp);
-  rise[1] /= time < 0.5 * duration_ ? ramp : -ramp;
-  rise[2] /= ramp * ramp;
+  ScalarMotion rise = CalcMinJerk(std::min(time, duration_ - time), ramp);
+  if (time >= 0.5 * duration_) rise.s_dot *= -1.0;
   Eigen::Matrix<double, 3, kSeries> basis;
   for (int k = 0; k < kHarmonics; ++k) {
     const double w = 2.0 * kPi * (k + 1) / kPeriod;
     const double s = std::sin(w * time), c = std::cos(w * time);
     const Vector3d sine(s, w * c, -w * w * s), cosine(c, -w * s, -w * w * c);
     for (const auto& [column, f] : {std::pair(k, sine), std::pair(kHarmonics + k, cosine)})
-      basis.col(column) << rise[0] * f[0], rise[1] * f[0] + rise[0] * f[1],
-          rise[2] * f[0] + 2.0 * rise[1] * f[1] + rise[0] * f[2];
+      basis.col(column) << rise.s * f[0], rise.s_dot * f[0] + rise.s * f[1],
+          rise.s_ddot * f[0] + 2.0 * rise.s_dot * f[1] + rise.s * f[2];
   }
   return basis;
 }

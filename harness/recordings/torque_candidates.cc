@@ -35,15 +35,14 @@ Parts BodyParts(int link, const BodyVector& change, int recording = -1) {
   return parts;
 }
 
-/// d BodyVector / d com of a body.
+/// d BodyVector / d com of a body, of which it is a square: differences are exact.
 BodyVector CentreColumn(const MassProperties& body, int k) {
-  const Vector3d& c = body.com;
-  const Vector3d e = Vector3d::Unit(k);
-  const Matrix3d I =
-      body.mass * (2.0 * c.dot(e) * Matrix3d::Identity() - e * c.transpose() - c * e.transpose());
-  BodyVector change;
-  change << 0.0, body.mass * e, I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
-  return change;
+  const auto at = [&](double by) {
+    MassProperties moved = body;
+    moved.com[k] += by;
+    return BodyVector(TorqueRegressor::Pack(moved));
+  };
+  return 0.5 * (at(1.0) - at(-1.0));
 }
 
 class FaultList {
@@ -74,13 +73,17 @@ class FaultList {
   }
 
  private:
-  TorqueFault& Add(TorqueFault::Kind kind, int index, const std::string& fault, const std::string& place,
-                   const std::string& unit, std::vector<Parts> columns, double nominal = 0.0) {
+  /// Adds a fault of a joint or link, or for -1 of all joints.
+  TorqueFault& Add(TorqueFault::Kind kind, int index, const std::string& fault, const std::string& unit,
+                   std::vector<Parts> columns, double nominal = 0.0) {
     TorqueFault& one = faults_.emplace_back();
     one.kind = kind;
     one.index = index;
     one.fault = fault;
-    one.place = place;
+    const bool is_of_link = kind >= TorqueFault::kMass && kind <= TorqueFault::kPayload;
+    one.place = index < 0    ? "all joints"
+                : is_of_link ? "link " + model_.link_name(index)
+                             : "joint " + model_.joint(index).name;
     one.unit = unit;
     one.nominal = nominal;
     one.sums = std::move(columns);
@@ -91,8 +94,7 @@ class FaultList {
   TorqueFault& AddAtJoint(TorqueFault::Kind kind, int joint, const std::string& fault,
                           const std::string& unit, TorqueColumn column, double nominal, bool is_positive,
                           double most) {
-    TorqueFault& one =
-        Add(kind, joint, fault, "joint " + model_.joint(joint).name, unit, {{{column, joint}}}, nominal);
+    TorqueFault& one = Add(kind, joint, fault, unit, {{{column, joint}}}, nominal);
     if (is_positive) one.least = VectorXd::Constant(1, -nominal);
     one.most = VectorXd::Constant(1, most);
     return one;
@@ -156,7 +158,7 @@ class FaultList {
     AddAtJoint(kTorqueGain, joint, "torque gain", "", {TorqueColumn::kTorque, joint}, 1.0, false, kMostGain)
         .is_possible = IsGain;
     TorqueFault& stuck =
-        Add(kStuckTorque, joint, "stuck torque", "joint " + modelled.name, torque,
+        Add(kStuckTorque, joint, "stuck torque", torque,
             {{{{TorqueColumn::kOffset, joint}, joint}}, {{{TorqueColumn::kTorque, joint}, joint, -1.0}}});
     stuck.is_possible = IsStuck;
     TorqueFault& delay =
@@ -167,34 +169,32 @@ class FaultList {
     for (int k = 0; k < limits && recordings_ == 1; ++k) {
       const TorqueColumn beyond{TorqueColumn::kCutOff, joint, 2 * k},
           limit{TorqueColumn::kCutOff, joint, 2 * k + 1};
-      TorqueFault& one = Add(kSaturation, joint, "saturation", "joint " + modelled.name, torque,
-                             {{{beyond, joint}}, {{limit, joint}}});
+      TorqueFault& one = Add(kSaturation, joint, "saturation", torque, {{{beyond, joint}}, {{limit, joint}}});
       one.parameters = 1;
       one.is_possible = [](const VectorXd& a) {
         return std::abs(a[0] - 1.0) < kWhole && std::abs(a[1]) < kWhole;
       };
     }
-    TorqueFault& backlash = Add(kBacklash, joint, "backlash", "joint " + modelled.name, turns ? "rad" : "m",
+    TorqueFault& backlash = Add(kBacklash, joint, "backlash", turns ? "rad" : "m",
                                 {{{{TorqueColumn::kBacklash, joint}, -1, -0.5}}});
     backlash.is_possible = [](const VectorXd& a) { return a[0] > 0.0; };
     backlash.most = VectorXd::Constant(1, turns ? 0.2 : 0.02);
-    TorqueFault& elastic = Add(kElasticity, joint, "elasticity", "joint " + modelled.name,
-                               turns ? "rad/(N m)" : "m/N", {{{{TorqueColumn::kElastic, joint}, -1, -1.0}}});
+    TorqueFault& elastic = Add(kElasticity, joint, "elasticity", turns ? "rad/(N m)" : "m/N",
+                               {{{{TorqueColumn::kElastic, joint}, -1, -1.0}}});
     elastic.is_possible = [](const VectorXd& a) { return a[0] > 0.0; };
     elastic.most = VectorXd::Constant(1, (turns ? 0.2 : 0.02) / most);
-    Add(kZero, joint, "position offset", "joint " + modelled.name, turns ? "rad" : "m",
+    Add(kZero, joint, "position offset", turns ? "rad" : "m",
         {{{{TorqueColumn::kPosition, joint}, -1, -1.0}}})
         .most = VectorXd::Constant(1, std::min(turns ? kPi : 1.0, width > 0.0 ? width : kInfinite));
-    TorqueFault& late = Add(kLatePosition, joint, "delay of the position", "joint " + modelled.name, "s",
-                            {{{{TorqueColumn::kLatePosition, joint}}}});
+    TorqueFault& late =
+        Add(kLatePosition, joint, "delay of the position", "s", {{{{TorqueColumn::kLatePosition, joint}}}});
     LimitDelay(&late);
     constexpr double kMostOff = 0.3;
-    Add(kPositionGain, joint, "position gain", "joint " + modelled.name, "",
-        {{{{TorqueColumn::kPositionGain, joint}, -1, -1.0}}}, 1.0)
+    Add(kPositionGain, joint, "position gain", "", {{{{TorqueColumn::kPositionGain, joint}, -1, -1.0}}}, 1.0)
         .is_possible = IsNoLonger(kMostOff, VectorXd::Zero(1));
     for (const int harmonics : {2, kTurns}) {
       if (!turns) break;
-      TorqueFault& turn = Add(kEccentricity, joint, "eccentric encoder", "joint " + modelled.name, "rad", {});
+      TorqueFault& turn = Add(kEccentricity, joint, "eccentric encoder", "rad", {});
       for (int k = 0; k < harmonics; ++k) turn.sums.push_back({{{TorqueColumn::kTurn, joint, k}, -1, -1.0}});
       constexpr double kMostError = 0.1;
       turn.is_possible = IsNoLonger(kMostError, VectorXd::Zero(harmonics));
@@ -206,8 +206,7 @@ class FaultList {
   void AddGeometry(int joint) {
     const auto add = [&](const std::string& fault, const std::string& unit, int first, int count,
                          double most) {
-      TorqueFault& one =
-          Add(TorqueFault::kGeometry, joint, fault, "joint " + model_.joint(joint).name, unit, {});
+      TorqueFault& one = Add(TorqueFault::kGeometry, joint, fault, unit, {});
       for (int k = first; k < first + count; ++k) one.sums.push_back({{{TorqueColumn::kGeometry, joint, k}}});
       one.is_possible = IsNoLonger(most, VectorXd::Zero(count));
     };
@@ -228,7 +227,7 @@ class FaultList {
     const TorqueColumn fast{TorqueColumn::kFriction, joint, first + 1};
     const double slope = 1.0 / std::log(kFineRatio);
     TorqueFault& one = Add(
-        kind, joint, fault, "joint " + model_.joint(joint).name, unit,
+        kind, joint, fault, unit,
         {{{slow, joint, 0.5}, {fast, joint, 0.5}}, {{slow, joint, -slope}, {fast, joint, slope}}}, nominal);
     one.is_possible = [nominal](const VectorXd& a) {
       return nominal + a[0] > 0.0 && std::abs(a[1]) < std::abs(a[0]);
@@ -239,46 +238,37 @@ class FaultList {
   void AddLink(int link) {
     const MassProperties& body = model_.joint(link).body;
     const BodyVector vector = TorqueRegressor::Pack(body);
-    const std::string place = "link " + model_.link_name(link);
-    const bool is_real = IsBody(vector);
-    const auto can_be = [vector, is_real](const std::vector<BodyVector>& changes) {
-      return [vector, is_real, changes](const VectorXd& a) {
-        BodyVector changed = vector;
-        for (size_t k = 0; k < changes.size(); ++k) changed += a[static_cast<Eigen::Index>(k)] * changes[k];
-        if (!is_real || IsBody(changed)) return true;
-        // Moments that the motion does not show may be larger as well.
-        constexpr double kUnseen = 1e-6;
-        const double most = changes.size() == 6 ? a.head<3>().maxCoeff() : 0.0;
-        for (int k = 0; k < 3 && most > 0.0; ++k)
-          if (std::abs(a[k]) < kUnseen * most) changed[4 + k] += most;
-        return IsBody(changed);
-      };
-    };
     using enum TorqueFault::Kind;
     if (body.mass > 0.0) {
       // With the inertia of its shape, or at its centre.
       for (const BodyVector& change :
            {BodyVector(vector / body.mass), TorqueRegressor::Pack({1.0, body.com})}) {
         constexpr double kMostTimes = 10.0;
-        Add(kMass, link, "mass", place, "kg", {BodyParts(link, change)}, body.mass).is_possible =
+        Add(kMass, link, "mass", "kg", {BodyParts(link, change)}, body.mass).is_possible =
             [m = body.mass](const VectorXd& a) { return m + a[0] > 0.0 && m + a[0] < kMostTimes * m; };
       }
-      std::vector<BodyVector> changes;
-      TorqueFault& centre = Add(kCentre, link, "centre of mass", place, "m", std::vector<Parts>(3));
+      TorqueFault& centre = Add(kCentre, link, "centre of mass", "m", std::vector<Parts>(3));
       PlaceMass(model_, Vector3d::Zero(), &centre);
       constexpr double kLength = 0.05, kFarthest = 0.15;
       centre.scale = VectorXd::Constant(3, kLength);
       centre.is_possible = [](const VectorXd& a) { return a.norm() < kFarthest; };
       centre.is_ordinary = true;
-      TorqueFault& inertia = Add(kInertia, link, "inertia", place, "kg m^2", {});
-      changes.clear();
-      for (int k = 4; k < TorqueRegressor::kBody; ++k) {
-        changes.emplace_back(BodyVector::Unit(k));
-        inertia.sums.push_back(BodyParts(link, changes.back()));
-      }
+      TorqueFault& inertia = Add(kInertia, link, "inertia", "kg m^2", {});
+      for (int k = 4; k < TorqueRegressor::kBody; ++k)
+        inertia.sums.push_back(BodyParts(link, BodyVector::Unit(k)));
       constexpr double kGyration = 0.1;
       inertia.scale = VectorXd::Constant(6, body.mass * kGyration * kGyration);
-      inertia.is_possible = can_be(changes);
+      inertia.is_possible = [vector, is_real = IsBody(vector)](const VectorXd& a) {
+        BodyVector changed = vector;
+        changed.tail<6>() += a;
+        if (!is_real || IsBody(changed)) return true;
+        // Moments that the motion does not show may be larger as well.
+        constexpr double kUnseen = 1e-6;
+        const double most = a.head<3>().maxCoeff();
+        for (int k = 0; k < 3 && most > 0.0; ++k)
+          if (std::abs(a[k]) < kUnseen * most) changed[4 + k] += most;
+        return IsBody(changed);
+      };
     }
     AddPayload(link);
   }
@@ -297,8 +287,7 @@ class FaultList {
     for (int recording = first; recording < first + recordings_; ++recording) {
       // A point, and a body with an inertia of its own.
       for (const int width : {4, TorqueRegressor::kBody}) {
-        TorqueFault& one =
-            Add(TorqueFault::kPayload, link, "payload", "link " + model_.link_name(link), "kg", {});
+        TorqueFault& one = Add(TorqueFault::kPayload, link, "payload", "kg", {});
         one.recording = recording;
         for (int k = 0; k < width; ++k) one.sums.push_back(BodyParts(link, BodyVector::Unit(k), recording));
         one.scale = VectorXd::Constant(width, kMoment);
@@ -330,20 +319,21 @@ class FaultList {
       AddInAll(kAllFriction, "dry and viscous friction", {TorqueColumn::kDry, TorqueColumn::kViscous});
       AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).is_possible = nullptr;
       faults_.back().scale = VectorXd::Constant(static_cast<Eigen::Index>(joints_.size()), kMostTorque);
-      LimitDelay(&Add(kDelay, -1, "delay of the torques", "all joints", "s", {delay}));
-      TorqueFault& all = Add(kTorqueGain, -1, "torque gain", "all joints", "", {gain}, 1.0);
+      LimitDelay(&Add(kDelay, -1, "delay of the torques", "s", {delay}));
+      TorqueFault& all = Add(kTorqueGain, -1, "torque gain", "", {gain}, 1.0);
       all.is_possible = IsGain;
       all.most = VectorXd::Constant(1, kMostGain);
     }
     // A simulator's velocity is that of half a step before; its damping may be that of the step's end.
     constexpr double kBeyond = 0.1;
     for (const std::vector<Parts>& columns : {std::vector<Parts>{late}, {implicit}, {late, implicit}}) {
-      TorqueFault& one = Add(kIntegrator, -1, "integrator", "all joints", "s", columns);
+      TorqueFault& one = Add(kIntegrator, -1, "integrator", "s", columns);
       const auto count = static_cast<Eigen::Index>(columns.size());
       one.least = VectorXd::Constant(count, -kBeyond * extents_.step);
       one.most = VectorXd::Constant(count, (1.0 + kBeyond) * extents_.step);
     }
-    TorqueFault& gravity = Add(kGravity, -1, "gravity", "world", "m/s^2", {});
+    TorqueFault& gravity = Add(kGravity, -1, "gravity", "m/s^2", {});
+    gravity.place = "world";
     for (int k = 0; k < 3; ++k) gravity.sums.push_back({{{TorqueColumn::kGravity, 0, k}, -1, 1.0}});
     const double g = std::max(model_.gravity().norm(), 1.0);
     gravity.scale = VectorXd::Constant(3, g);
@@ -354,7 +344,8 @@ class FaultList {
     const double swing = std::min(kSwing, kG / Square(refinements_.shaking));
     for (const int width : {6, 12}) {
       if (!(refinements_.shaking > 0.0)) break;
-      TorqueFault& one = Add(kShaking, -1, width == 6 ? "shaking" : "shaking and tilting", "base", "m", {});
+      TorqueFault& one = Add(kShaking, -1, width == 6 ? "shaking" : "shaking and tilting", "m", {});
+      one.place = "base";
       for (int k = 0; k < width; ++k) one.sums.push_back({{{TorqueColumn::kShaking, 0, k}}});
       one.scale = VectorXd::Constant(width, kSwing);
       one.is_possible = IsNoLonger(swing, VectorXd::Zero(width));
@@ -383,7 +374,7 @@ class FaultList {
   /// In every joint.
   TorqueFault& AddInAll(TorqueFault::Kind kind, const std::string& name,
                         const std::vector<TorqueColumn::Kind>& columns) {
-    TorqueFault& one = Add(kind, -1, name, "all joints", "N m", {});
+    TorqueFault& one = Add(kind, -1, name, "N m", {});
     for (const TorqueColumn::Kind column : columns)
       for (const int joint : joints_) one.sums.push_back({{{column, joint}, joint}});
     // In all of them, not in a few and by noise in the others.
@@ -465,19 +456,17 @@ static void ShiftCentre(const RobotModel& model, const Vector3d& shift, TorqueFa
 }
 
 static void PlacePayload(double mass, const Vector3d& h, TorqueFault* payload) {
-  // I(m, h) = (h^2 1 - h h^T) / m has degree one, so that its derivatives times m and h are I itself.
-  const auto column = [&](int k) {
-    const Vector3d e = k > 0 ? Vector3d(Vector3d::Unit(k - 1)) : Vector3d(Vector3d::Zero());
-    const Matrix3d I =
-        k == 0 ? Matrix3d(-CalcPointInertia(1.0 / (mass * mass), h))
-               : Matrix3d((2.0 * h.dot(e) * Matrix3d::Identity() - e * h.transpose() - h * e.transpose()) /
-                          mass);
-    BodyVector change;
-    change << (k == 0 ? 1.0 : 0.0), e, I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
-    return change;
+  const auto at = [&](const Vector3d& moment) {
+    return BodyVector(TorqueRegressor::Pack({mass, moment / mass, Matrix3d::Zero()}));
   };
-  for (int k = 0; k < 4; ++k)
-    payload->sums[static_cast<size_t>(k)] = BodyParts(payload->index, column(k), payload->recording);
+  // It is a square of h, and of degree one in mass and h together: its derivatives times these are itself.
+  BodyVector rest = at(h);
+  for (int k = 0; k < 3; ++k) {
+    const BodyVector column = 0.5 * (at(h + Vector3d::Unit(k)) - at(h - Vector3d::Unit(k)));
+    payload->sums[static_cast<size_t>(k + 1)] = BodyParts(payload->index, column, payload->recording);
+    rest -= h[k] * column;
+  }
+  payload->sums.front() = BodyParts(payload->index, rest / mass, payload->recording);
 }
 
 void PlaceMass(const RobotModel& model, const VectorXd& amplitude, TorqueFault* fault) {
