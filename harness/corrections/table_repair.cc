@@ -2,9 +2,11 @@
 
 #include <toml++/toml.h>
 
+#include <algorithm>
+#include <functional>
+#include <optional>
 #include <vector>
 
-#include "controller/common/toml_reader.h"
 #include "harness/corrections/repair_writer.h"
 
 namespace dexcheck {
@@ -19,14 +21,15 @@ constexpr JointKeys kTableKeys = {
     ", ",
     "[{}]"};
 
-/// Assignments to keys of a parameter file.
+/// A parameter file, in whose text single values are replaced.
 class TableRepair final : private RepairWriter {
  public:
   TableRepair(const DescriptionFile& file, const PrintedRobot& before, const PrintedRobot& after)
-      : RepairWriter(file, kTableKeys, before, after),
-        source_(file.path().string()),
-        text_(file.text()),
-        root_(toml::parse(text_)) {}
+      : RepairWriter(file, kTableKeys, before, after), text_(file.text()), root_(toml::parse(text_)) {
+    for (size_t at = 0; at != std::string::npos;
+         at = text_.find('\n', at), at += at == std::string::npos ? 0 : 1)
+      lines_.push_back(at);
+  }
 
   std::string Write() {
     for (int i = 1; i < before_.size(); ++i) {
@@ -40,24 +43,30 @@ class TableRepair final : private RepairWriter {
     }
     if (before_.link(0).inertial && IsOther(before_.link(0).inertial, after_.link(0).inertial))
       Refuse("the base's numbers must be written by hand");
-    return ApplyOverrides(text_, source_, assignments_);
+    if (after_.gravity && after_.gravity != before_.gravity)
+      Set(root_, "gravity", JoinVector(*after_.gravity));
+    std::ranges::stable_sort(edits_, std::greater<>(), &Edit::begin);
+    for (const Edit& edit : edits_) text_.replace(edit.begin, edit.end - edit.begin, edit.text);
+    return text_;
   }
 
  private:
-  /// A table of the file and the path that leads to it: "chain.0.rows.3".
+  /// A table of the file.
   struct Entry {
     const toml::table* table;
-    std::string path;
     bool states_convention;  ///< Of its chain's rows.
+  };
+  struct Edit {
+    size_t begin, end;
+    std::string text;
   };
 
   /// The entry of a list that has this name; none where there is none.
-  [[nodiscard]] static std::optional<Entry> FindIn(const toml::array* list, const std::string& begin,
-                                                   const char* key, const std::string& name, bool states) {
+  [[nodiscard]] static std::optional<Entry> FindIn(const toml::array* list, const char* key,
+                                                   const std::string& name, bool states) {
     for (size_t k = 0; list != nullptr && k < list->size(); ++k) {
       const toml::table* const entry = list->get(k)->as_table();
-      if ((*entry)[key].value_or(std::string()) == name)
-        return Entry{entry, begin + std::to_string(k), states};
+      if ((*entry)[key].value_or(std::string()) == name) return Entry{entry, states};
     }
     return std::nullopt;
   }
@@ -70,11 +79,9 @@ class TableRepair final : private RepairWriter {
       const std::string prefix = chain["prefix"].value_or(std::string());
       if (!name.starts_with(prefix)) continue;
       const std::string own = name.substr(prefix.size());
-      const std::string begin = fmt::format("chain.{}.{}.", i, key);
       const bool states = chain.contains("convention");
-      if (const toml::table* const entry = chain[key][own].as_table())
-        return Entry{entry, begin + own, states};
-      const auto found = FindIn(chain[key].as_array(), begin, key == "rows" ? "joint" : "name", own, states);
+      if (const toml::table* const entry = chain[key][own].as_table()) return Entry{entry, states};
+      const auto found = FindIn(chain[key].as_array(), key == "rows" ? "joint" : "name", own, states);
       if (found) return found;
     }
     return std::nullopt;
@@ -84,20 +91,32 @@ class TableRepair final : private RepairWriter {
     Refuse(fmt::format("{} is not among the {} of its chain", name, key));
   }
 
-  void Set(const Entry& entry, const char* key, const std::string& value) {
-    assignments_.push_back(entry.path + "." + key + "=" + value);
+  [[nodiscard]] size_t OffsetOf(const toml::source_position& at) const {
+    return lines_[at.line - 1] + at.column - 1;
   }
-  void Remove(const Entry& entry, const char* key) {
-    if (entry.table->contains(key)) assignments_.push_back(entry.path + "." + key + "-=");
+  /// Sets a key, in the place of one in degrees, or adds it.
+  void Set(const toml::table& table, const std::string& key, const std::string& value) {
+    const std::string assignment = key + " = " + value;
+    const size_t end = OffsetOf(table.source().end);
+    if (const auto own = table.find(key); own != table.end()) {
+      const toml::source_region& was = own->second.source();
+      edits_.push_back({OffsetOf(was.begin), OffsetOf(was.end), value});
+    } else if (const auto degrees = table.find(key + "_deg"); degrees != table.end()) {
+      edits_.push_back(
+          {OffsetOf(degrees->first.source().begin), OffsetOf(degrees->second.source().end), assignment});
+    } else if (table.is_inline()) {
+      const size_t last = text_.find_last_not_of(" \t", end - 2) + 1;
+      edits_.push_back({last, last, (table.empty() ? "" : ", ") + assignment});
+    } else {
+      edits_.push_back({end, end, "\n" + assignment});
+    }
   }
   void SetOfJoint(const PrintedLink& link, const std::string& path, const std::string& value) override {
     const size_t slash = path.find('/');
-    Set(Find(path.substr(0, slash), link.joint.name), path.substr(slash + 1).c_str(), value);
+    Set(*Find(path.substr(0, slash), link.joint.name).table, path.substr(slash + 1), value);
   }
   void WriteRange(const PrintedLink& link, double lower, double upper) override {
-    const Entry entry = Find("joints", link.joint.name);
-    Remove(entry, "range_deg");
-    Set(entry, "range", JoinVector(Vector2d(lower, upper)));
+    Set(*Find("joints", link.joint.name).table, "range", JoinVector(Vector2d(lower, upper)));
   }
 
   void WriteRow(const PrintedLink& link, PrintedOrigin origin) {
@@ -108,43 +127,40 @@ class TableRepair final : private RepairWriter {
     }
     RefuseIf(origin.form != link.origin.form || row.states_convention, link, "its row");
     if (origin.form == RotationForm::kMdh) {
-      Remove(row, "alpha_deg");
-      Remove(row, "q_deg");
-      Set(row, "alpha", Format(origin.r[0]));
-      Set(row, "q", Format(origin.r[1]));
-      Set(row, "a", Format(origin.t[0]));
-      Set(row, "d", Format(origin.t[2]));
+      Set(*row.table, "alpha", Format(origin.r[0]));
+      Set(*row.table, "q", Format(origin.r[1]));
+      Set(*row.table, "a", Format(origin.t[0]));
+      Set(*row.table, "d", Format(origin.t[2]));
       return;
     }
-    SetPose(row, link.origin, origin);
+    SetPose(*row.table, link.origin, origin);
   }
 
   /// Writes an entry of the file's "frame", or of a chain's "frames".
   void WriteFrame(const PrintedLink& frame, const PrintedOrigin& origin) {
-    std::optional<Entry> entry = FindIn(root_["frame"].as_array(), "frame.", "name", frame.name, false);
+    std::optional<Entry> entry = FindIn(root_["frame"].as_array(), "name", frame.name, false);
     if (!entry) entry = Look("frames", frame.name);
     if (!entry) Refuse("frame " + frame.name + " must be written by hand");
-    SetPose(*entry, frame.origin, origin);
+    SetPose(*entry->table, frame.origin, origin);
   }
 
-  void SetPose(const Entry& entry, const PrintedOrigin& before, const PrintedOrigin& origin) {
+  void SetPose(const toml::table& entry, const PrintedOrigin& before, const PrintedOrigin& origin) {
     if (before.t != origin.t) Set(entry, "xyz", JoinVector(origin.t));
-    if (!IsTurned(before, origin)) return;
-    Remove(entry, "rpy_deg");
-    Set(entry, "rpy", JoinVector(Vector3d(origin.r.head<3>())));
+    if (IsTurned(before, origin)) Set(entry, "rpy", JoinVector(Vector3d(origin.r.head<3>())));
   }
 
   void WriteBody(const PrintedLink& before, const PrintedLink& after) {
     const Entry entry = Find("links", before.name);
     RefuseIf(!entry.table->contains("mass") || !after.inertial, before, "its link");
-    Set(entry, "mass", Format(after.inertial->mass.value));
-    Set(entry, "com", JoinVector(after.inertial->origin.t));
-    Set(entry, "inertia", JoinVector(CalcInertia(*after.inertial)));
+    Set(*entry.table, "mass", Format(after.inertial->mass.value));
+    Set(*entry.table, "com", JoinVector(after.inertial->origin.t));
+    Set(*entry.table, "inertia", JoinVector(CalcInertia(*after.inertial)));
   }
 
-  std::string source_, text_;
+  std::string text_;
   toml::table root_;
-  std::vector<std::string> assignments_;
+  std::vector<size_t> lines_;  // begins of them
+  std::vector<Edit> edits_;
 };
 
 }  // namespace

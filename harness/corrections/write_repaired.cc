@@ -254,13 +254,13 @@ RepairedFile WriteRepaired(const DescriptionFile& file, const PrintedRobot& prin
   if (!changes)
     throw InputError(file.path().filename().string() +
                      ": cannot be repaired: its causes must be corrected by hand");
-  repaired.text = file.format() == RobotFormat::kToml ? WriteTable(file, printed, after)
-                                                      : WriteXml(file, printed, after, folder);
+  repaired.text = WriteNumbers(file, printed, after, folder);
   return repaired;
 }
 
-std::string WriteXml(const DescriptionFile& file, const PrintedRobot& before, const PrintedRobot& after,
-                     const std::filesystem::path& folder) {
+std::string WriteNumbers(const DescriptionFile& file, const PrintedRobot& before, const PrintedRobot& after,
+                         const std::filesystem::path& folder) {
+  if (file.format() == RobotFormat::kToml) return WriteTable(file, before, after);
   if (file.format() == RobotFormat::kUrdf) return UrdfRepair(file, before, after).Write();
   return MjcfRepair(file, before, after).Write(folder);
 }

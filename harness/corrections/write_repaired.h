@@ -24,9 +24,9 @@ struct RepairedFile {
 RepairedFile WriteRepaired(const DescriptionFile& file, const PrintedRobot& printed,
                            const PrintedRobot& reference, const std::filesystem::path& folder);
 
-/// Returns the text of `file`, a URDF or an MJCF, with the numbers of `after` where they are not those of
-/// `before`, which it prints. Comments stay. @throws InputError as WriteRepaired.
-std::string WriteXml(const DescriptionFile& file, const PrintedRobot& before, const PrintedRobot& after,
-                     const std::filesystem::path& folder);
+/// Returns the text of `file` with the numbers of `after` where they are not those of `before`, which it
+/// prints. Comments stay. @throws InputError as WriteRepaired.
+std::string WriteNumbers(const DescriptionFile& file, const PrintedRobot& before, const PrintedRobot& after,
+                         const std::filesystem::path& folder);
 
 }  // namespace dexcheck

@@ -1,7 +1,6 @@
 #include "harness/recordings/write_corrections.h"
 
 #include <fmt/format.h>
-#include <toml++/toml.h>
 
 #include <algorithm>
 #include <functional>
@@ -77,15 +76,6 @@ Corrections Collect(const RobotModel& model, const RecordingJudgement& judgement
   return corrections;
 }
 
-std::string Show(double value) { return fmt::format("{:.10g}", value); }
-
-template <typename Vector>
-std::string Join(const Vector& values, const char* separator) {
-  std::string text;
-  for (Eigen::Index i = 0; i < values.size(); ++i) text += (i == 0 ? "" : separator) + Show(values[i]);
-  return text;
-}
-
 /// A link's body with what is added to it, in the frame of its file.
 class CorrectedBody {
  public:
@@ -122,7 +112,7 @@ void MoveToLeft(const std::string& what, CorrectedFile* file) {
   file->left.push_back(what);
 }
 
-/// An XML file's robot with the corrections.
+/// A file's robot with the corrections.
 PrintedRobot CorrectPrinted(const RobotDescription& robot, PrintedRobot printed,
                             const Corrections& corrections, CorrectedFile* file) {
   const bool is_urdf = robot.format == RobotFormat::kUrdf;
@@ -163,85 +153,6 @@ PrintedRobot CorrectPrinted(const RobotDescription& robot, PrintedRobot printed,
   return printed;
 }
 
-/// A parameter file, in whose text single values are replaced.
-class TomlCopy {
- public:
-  TomlCopy(const RobotDescription& robot, const std::string& text)
-      : robot_(robot), text_(text), root_(toml::parse(text)) {
-    for (size_t at = 0; at != std::string::npos;
-         at = text.find('\n', at), at += at == std::string::npos ? 0 : 1)
-      lines_.push_back(at);
-  }
-
-  std::string Write(const Corrections& corrections, CorrectedFile* file) {
-    const auto set = [&](const std::map<int, double>& values, const char* key) {
-      for (const auto& [joint, value] : values)
-        Set(GetTable("joints", robot_.spec.joints[static_cast<size_t>(joint)].name), key, Show(value));
-    };
-    set(corrections.dry, "dry_friction");
-    set(corrections.viscous, "damping");
-    set(corrections.armature, "armature");
-    for (const auto& [link, change] : corrections.bodies) {
-      const MassProperties body = CorrectedBody(robot_, link).Add(change, file);
-      const toml::table& table = GetTable("links", robot_.spec.joints[static_cast<size_t>(link)].link);
-      Set(table, "mass", Show(body.mass));
-      Set(table, "com", "[" + Join(body.com, ", ") + "]");
-      Set(table, "inertia", "[" + Join(ToEntries(body.inertia), ", ") + "]");
-    }
-    if (corrections.gravity) Set(root_, "gravity", "[" + Join(*corrections.gravity, ", ") + "]");
-    std::sort(edits_.begin(), edits_.end(), [](const Edit& a, const Edit& b) { return a.begin > b.begin; });
-    for (const Edit& edit : edits_) text_.replace(edit.begin, edit.end - edit.begin, edit.text);
-    return text_;
-  }
-
- private:
-  struct Edit {
-    size_t begin, end;
-    std::string text;
-  };
-
-  /// Finds the table of a joint or link: [chain.joints] NAME, with the chain's prefix or without.
-  const toml::table& GetTable(const char* kind, const std::string& name) const {
-    const toml::array* chains = root_["chain"].as_array();
-    for (size_t i = 0; chains != nullptr && i < chains->size(); ++i) {
-      const toml::table* chain = (*chains)[i].as_table();
-      if (chain == nullptr) continue;
-      const std::string prefix = (*chain)["prefix"].value_or(std::string());
-      const toml::table* own = (*chain)[kind].as_table();
-      for (auto it = own == nullptr ? toml::table::const_iterator() : own->begin();
-           own != nullptr && it != own->end(); ++it)
-        if (it->second.is_table() && prefix + std::string(it->first.str()) == name)
-          return *it->second.as_table();
-    }
-    throw InputError(
-        fmt::format("{}: {} has no table of its own under {} (dexcheck import writes a file that has)",
-                    robot_.spec.source, Quote(name), kind));
-  }
-
-  [[nodiscard]] size_t OffsetOf(const toml::source_position& at) const {
-    return lines_[at.line - 1] + at.column - 1;
-  }
-
-  void Set(const toml::table& table, const char* key, const std::string& value) {
-    if (const toml::node* node = table.get(key)) {
-      edits_.push_back({OffsetOf(node->source().begin), OffsetOf(node->source().end), value});
-    } else if (table.is_inline()) {
-      const size_t brace = text_.rfind('}', OffsetOf(table.source().end) - 1);
-      const size_t end = text_.find_last_not_of(" \t", brace - 1) + 1;
-      edits_.push_back({end, end, fmt::format("{}{} = {}", table.empty() ? "" : ", ", key, value)});
-    } else {
-      throw InputError(fmt::format("{}: line {}: has no {} that could be changed", robot_.spec.source,
-                                   table.source().begin.line, key));
-    }
-  }
-
-  const RobotDescription& robot_;
-  std::string text_;
-  toml::table root_;
-  std::vector<size_t> lines_;
-  std::vector<Edit> edits_;
-};
-
 }  // namespace
 
 CorrectedFile WriteCorrections(const DescriptionFile& source, const RecordingJudgement& judgement,
@@ -249,12 +160,8 @@ CorrectedFile WriteCorrections(const DescriptionFile& source, const RecordingJud
   const RobotDescription robot = source.Describe();
   CorrectedFile file;
   const Corrections corrections = Collect(RobotModel(robot.spec), judgement, &file);
-  if (robot.format == RobotFormat::kToml) {
-    file.text = TomlCopy(robot, source.text()).Write(corrections, &file);
-    return file;
-  }
   const PrintedRobot before = ReadPrintedRobot(source);
-  file.text = WriteXml(source, before, CorrectPrinted(robot, before, corrections, &file), folder);
+  file.text = WriteNumbers(source, before, CorrectPrinted(robot, before, corrections, &file), folder);
   return file;
 }
 
