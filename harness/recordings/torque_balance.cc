@@ -338,12 +338,14 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
     auto row = parts_[place].col(used_[place]);
     FillRow(place, sample, row);
     const double residual = row[row.size() - 1];
-    // A joint that friction holds: more than friction can do is judged.
-    constexpr double kFrictions = 4.0, kMuch = 0.3;
+    // A joint that friction holds, whichever way: more than friction can do is judged. A smaller part of the
+    // largest torque would show more pushes, but then friction is noise beside a wrong mass, which gets no
+    // name.
+    constexpr double kFrictions = 2.0, kMuch = 0.1;
     const double friction = model_->joint(joint).dry_friction;
-    const bool is_more =
-        friction > 0.0 && sample.beyond[joint] == 0.0 &&
-        std::abs(residual) > std::max(kFrictions * friction, kMuch * sample.most_torque[joint]);
+    const double held = residual + friction * sample.direction[joint];
+    const bool is_more = friction > 0.0 && !has_currents_ && sample.beyond[joint] == 0.0 &&
+                         std::abs(held) > std::max(kFrictions * friction, kMuch * sample.most_torque[joint]);
     if (!is_judged[static_cast<size_t>(joint)] && !is_more) continue;
     residual_[static_cast<Index>(place)] = residual;
     block.sums[place] += row;
