@@ -109,7 +109,7 @@ void AddForcesAtPoints(const VectorXd& y, const std::vector<Turns>& turns, doubl
   constexpr size_t kMostBodies = 8;       // that are looked at
   constexpr double kPointExplains = 0.9;  // of |y|^2, by force and moment
   const std::vector<Body> bodies = ListBodies(turns, *candidates);
-  std::vector<std::pair<double, size_t>> ranked;  // by what is left of y
+  std::vector<std::pair<double, size_t>> ranked;  // by the square of the rest of y
   std::vector<VectorXd> wrenches;
   for (const Body& body : bodies) {
     MatrixXd both(y.size(), 6);

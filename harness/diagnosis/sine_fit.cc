@@ -21,7 +21,7 @@ Sine FindSine(const ArrayXd& y, const ArrayXd& x) {
   std::nth_element(apart.begin(), middle, apart.end());
   const double densest = 0.4 / *middle, grid = 0.25 / since.maxCoeff();  // four for a period in all of it
   MatrixXd columns(y.size(), 2);
-  // Minus what is left of y beside a sine of this frequency.
+  // Minus the square of the rest of y beside a sine of this frequency.
   const auto score = [&](double frequency) {
     if (!(frequency > grid)) return -std::numeric_limits<double>::infinity();
     columns << (2.0 * kPi * frequency * since).sin(), (2.0 * kPi * frequency * since).cos();

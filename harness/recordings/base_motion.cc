@@ -55,7 +55,7 @@ std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueB
   return windows;
 }
 
-/// What a push leaves in blocks of its recording: products of its columns, of all joints, and with the
+/// The effect of a push in blocks of its recording: products of its columns, of all joints, and with the
 /// residual.
 class PushProducts {
  public:
