@@ -126,9 +126,7 @@ class Parser {
     if (found != symbols_.end()) return found->second;
     std::vector<std::string> known = {"pi"};
     for (const auto& [symbol, value] : symbols_) known.push_back(symbol);
-    const std::string nearest = FindNearest(name, known);
-    Fail("unknown symbol " + Quote(name) +
-         (nearest.empty() ? "" : " (did you mean " + Quote(nearest) + "?)"));
+    Fail("unknown symbol " + Quote(name) + SuggestInBrackets(name, known));
   }
 
   std::string_view text_;

@@ -122,6 +122,12 @@ std::string SuggestNearest(std::string_view word, const std::vector<std::string>
   return nearest.empty() ? "" : ", did you mean " + Quote(nearest) + "?";
 }
 
+std::string SuggestInBrackets(std::string_view word, const std::vector<std::string>& candidates,
+                              std::string_view lead) {
+  const std::string nearest = FindNearest(word, candidates);
+  return nearest.empty() ? "" : " (" + std::string(lead) + Quote(nearest) + "?)";
+}
+
 std::string_view Trim(std::string_view text, std::string_view blanks) {
   const size_t begin = text.find_first_not_of(blanks);
   if (begin == std::string_view::npos) return {};

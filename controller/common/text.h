@@ -48,6 +48,9 @@ std::string QuoteField(const std::string& text);
 std::string FindNearest(std::string_view word, const std::vector<std::string>& candidates);
 /// ", did you mean "WORD"?" of that candidate; empty when none is close.
 std::string SuggestNearest(std::string_view word, const std::vector<std::string>& candidates);
+/// " (did you mean "WORD"?)", or with another `lead`; empty when none is close.
+std::string SuggestInBrackets(std::string_view word, const std::vector<std::string>& candidates,
+                              std::string_view lead = "did you mean ");
 
 /// The text without these letters before and behind it.
 std::string_view Trim(std::string_view text, std::string_view blanks = " \t\r");

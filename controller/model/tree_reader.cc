@@ -46,12 +46,6 @@ std::vector<std::string> ListKeys(const Map& map) {
   return keys;
 }
 
-/// " (did you mean ...?)" for a misspelt word, if any candidate is near.
-std::string Suggest(const std::string& word, const std::vector<std::string>& candidates) {
-  const std::string nearest = FindNearest(word, candidates);
-  return nearest.empty() ? "" : " (did you mean " + Quote(nearest) + "?)";
-}
-
 /// Names that must be unique, and who took them.
 class NameRegistry {
  public:
@@ -110,7 +104,8 @@ class TreeReader {
   Template* FindTemplate(const TomlValue& value) {
     const std::string name = value.AsText();
     const auto found = templates_.find(name);
-    if (found == templates_.end()) value.Fail("must be a template" + Suggest(name, ListKeys(templates_)));
+    if (found == templates_.end())
+      value.Fail("must be a template" + SuggestInBrackets(name, ListKeys(templates_)));
     found->second.used = true;
     return &found->second;
   }
@@ -184,7 +179,7 @@ class TreeReader {
       if (link.starts_with(prefix)) links.push_back(link.substr(prefix.size()));
     }
     if (prefix.empty()) links.push_back(spec_.base.link);
-    return Suggest(name, links);
+    return SuggestInBrackets(name, links);
   }
 
   void BuildChain(size_t index) {
@@ -253,7 +248,7 @@ class TreeReader {
       if (coupling.leader < 0) {
         std::vector<std::string> names;
         for (const Joint& other : spec_.joints) names.push_back(other.name);
-        entry.joint.Fail("must be a joint" + Suggest(name, names));
+        entry.joint.Fail("must be a joint" + SuggestInBrackets(name, names));
       }
       if (!seen.insert(coupling.leader).second) entry.joint.Fail("must not follow itself");
       coupling.offset += coupling.multiplier * entry.offset;
@@ -288,7 +283,7 @@ class TreeReader {
     for (Segment* segment : chain.segments()) {
       for (const std::string& key : ListKeys(segment->*entries)) names.push_back(key);
     }
-    row.Reject("has no entry in " + kind + Suggest(name, names) + ", got " + Quote(name));
+    row.Reject("has no entry in " + kind + SuggestInBrackets(name, names) + ", got " + Quote(name));
   }
 
   void BuildFrame(const FrameEntry& frame, const TomlValue& owner, const std::string& prefix) {

@@ -114,10 +114,9 @@ ProgramLayout::ProgramLayout(const RobotDescription& robot, const Json& json, co
     const std::string name = list[i].get<std::string>();
     const int found = IndexOf(names, name);
     if (found < 0) {
-      const std::string nearest = FindNearest(name, names);
       Fail(source, key,
-           "must be a joint of " + robot.spec.source +
-               (nearest.empty() ? "" : " (did you mean " + Quote(nearest) + "?)") + ", got " + Quote(name));
+           "must be a joint of " + robot.spec.source + SuggestInBrackets(name, names) + ", got " +
+               Quote(name));
     }
     if (Contains(joints, found)) Fail(source, key, "must be named once, got " + Quote(name) + " again");
     joints.push_back(found);

@@ -133,10 +133,7 @@ int UrdfFile::FindEnd(const UrdfJoint& joint, const char* end) const {
   if (const int found = IndexOf(links_, std::string_view(name), &UrdfLink::name); found >= 0) return found;
   std::vector<std::string> names;
   for (const UrdfLink& link : links_) names.push_back(link.name);
-  const std::string nearest = FindNearest(name, names);
-  Fail(joint.line, key + "must be a link" +
-                       (nearest.empty() ? "" : " (did you mean " + Quote(nearest) + "?)") + ", got " +
-                       Quote(name));
+  Fail(joint.line, key + "must be a link" + SuggestInBrackets(name, names) + ", got " + Quote(name));
 }
 
 void UrdfFile::Connect() {

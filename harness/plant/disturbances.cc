@@ -19,9 +19,8 @@ int FindBody(const RobotModel& model, const DisturbanceOptions& options, const s
   } catch (const std::invalid_argument&) {
     std::vector<std::string> names = {"object"};
     for (int i = -1; i < model.num_joints(); ++i) names.push_back(model.link_name(i));
-    const std::string nearest = FindNearest(options.body, names);
     throw InputError(source + ": " + options.key + ".body: is no link of the robot and not the object" +
-                     (nearest.empty() ? "" : " (" + Quote(nearest) + "?)") + ", got " + Quote(options.body));
+                     SuggestInBrackets(options.body, names, "") + ", got " + Quote(options.body));
   }
 }
 

@@ -23,9 +23,8 @@ VectorXd ByName::Resolve(std::span<const std::string> names, const std::string& 
       found = true;
     }
     if (found) continue;
-    const std::string nearest = FindNearest(group, {names.begin(), names.end()});
     throw InputError(source + ": " + key + ": fits no name of the robot" +
-                     (nearest.empty() ? "" : " (" + Quote(nearest) + "?)") + ", got " + Quote(group));
+                     SuggestInBrackets(group, {names.begin(), names.end()}, "") + ", got " + Quote(group));
   }
   return values;
 }

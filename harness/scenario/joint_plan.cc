@@ -28,9 +28,8 @@ class JointReader {
     if (joint < 0) {
       std::vector<std::string> names;
       for (const Joint& one : model_.joints()) names.push_back(one.name);
-      const std::string nearest = FindNearest(name, names);
       throw InputError(where + Quote(name) + " is no joint of the model" +
-                       (nearest.empty() ? "" : " (" + Quote(nearest) + "?)"));
+                       SuggestInBrackets(name, names, ""));
     }
     if (in_degrees && model_.joints()[static_cast<size_t>(joint)].type == JointType::kPrismatic) {
       throw InputError(where + Quote(name) + " is prismatic: give it in m, under the key without _deg");

@@ -34,9 +34,8 @@ class Bodies {
     const auto end = names_.end() - (plant_->object ? 1 : 0);
     const auto found = std::find(names_.begin(), end, name);
     if (found != end) return static_cast<size_t>(found - names_.begin());
-    const std::string nearest = FindNearest(name, {names_.begin(), end});
     throw InputError(source + ": " + key + ": is no link of the robot" +
-                     (nearest.empty() ? "" : " (" + Quote(nearest) + "?)") + ", got " + Quote(name));
+                     SuggestInBrackets(name, {names_.begin(), end}, "") + ", got " + Quote(name));
   }
 
   /// The base with its wheels.
