@@ -64,7 +64,7 @@ class Writer {
   int digits_;
 };
 
-std::string WriteUrdf(const DrawnRobot& robot, const Writer& w) {
+std::string WriteDrawnUrdf(const DrawnRobot& robot, const Writer& w) {
   std::string text = "<robot name=\"drawn\">\n";
   for (const DrawnLink& link : robot.links) {
     text += fmt::format("  <link name=\"{}\">\n", link.name);
@@ -346,7 +346,7 @@ std::string WriteRobot(const DrawnRobot& robot, const WrittenForm& form) {
     }
     ChangeFrames(X, &written);
   }
-  if (form.format == WrittenForm::Format::kUrdf) return WriteUrdf(written, Writer(form.digits));
+  if (form.format == WrittenForm::Format::kUrdf) return WriteDrawnUrdf(written, Writer(form.digits));
   if (form.format == WrittenForm::Format::kToml) return WriteToml(written, Writer(form.digits));
   return MjcfText(written, form).Write();
 }
