@@ -6,7 +6,7 @@
 #include <string>
 
 #include "controller/common/errors.h"
-#include "controller/contact/adjoint.h"
+#include "controller/object/so3.h"
 
 namespace dexcheck {
 

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "controller/common/errors.h"
-#include "controller/common/gram_matrix.h"
 #include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
 

@@ -46,7 +46,6 @@
 #include "controller/common/types.h"
 #include "controller/control/computed_torque.h"
 #include "controller/control/grasp_terms.h"
-#include "controller/control/object_tracking.h"
 #include "controller/control/pseudoinverse.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/dynamics/tree_factor.h"

@@ -14,10 +14,10 @@
 // and is computed with vectors: no n x n matrix is formed.
 
 #include "controller/common/types.h"
-#include "controller/control/actuation.h"
 #include "controller/control/grasp_terms.h"
 #include "controller/control/pseudoinverse.h"
 #include "controller/dynamics/model_terms.h"
+#include "controller/model/platform.h"
 #include "controller/model/robot_model.h"
 
 namespace dexcheck {

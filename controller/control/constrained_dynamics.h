@@ -5,10 +5,9 @@
 
 #include <Eigen/Cholesky>
 
-#include "controller/common/gram_matrix.h"
 #include "controller/common/linear_algebra.h"
 #include "controller/common/types.h"
-#include "controller/contact/ground_contacts.h"
+#include "controller/contact/grasp_map.h"
 #include "controller/control/grasp_terms.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/dynamics/tree_factor.h"

@@ -3,7 +3,7 @@
 // A controller stands between sensors and motors: a control law, or a task that uses several.
 
 #include "controller/common/types.h"
-#include "controller/control/grasp_model.h"
+#include "controller/control/grasp_terms.h"
 #include "controller/control/joint_motion.h"
 #include "controller/control/reading.h"
 #include "controller/control/trajectory.h"

@@ -15,7 +15,6 @@
 #include <vector>
 
 #include "controller/control/controller.h"
-#include "controller/control/grasp_controller.h"
 #include "controller/control/joint_controller.h"
 #include "controller/control/trajectory_controller.h"
 

@@ -4,12 +4,16 @@
 // along rolling contacts, and the object's terms. Fingers of one hand or of both, one hard-finger contact
 // each; n entries of xi, k = 3N of f_c = [f_c1; ..; f_cN].
 
+#include <array>
+#include <cstddef>
 #include <span>
 #include <vector>
 
 #include "controller/common/types.h"
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/shapes.h"
+#include "controller/control/reading.h"
+#include "controller/control/trajectory.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/object/object_dynamics.h"
 
@@ -129,6 +133,108 @@ class GraspTerms {
   Vector6d X_o_dot_ = Vector6d::Zero();
   ObjectTerms coordinates_{};
   VectorXd slip_, slip_bias_;
+};
+
+// The last bracket of (55): the acceleration of the object that makes its error obey (57),
+// E_ddot + K_v E_dot + K_p E = 0.
+
+/// K_v (1/s) and K_p (1/s^2) of (55), one entry for each axis: x, y, z, then the three of the orientation
+/// error.
+struct ObjectGains {
+  Vector6d K_v = Vector6d::Zero();
+  Vector6d K_p = Vector6d::Zero();
+};
+
+/// Which orientation error (55) feeds back.
+enum class OrientationFeedback {
+  kAngles,    ///< E = X_d - X_o in ZYZ angles, as printed.
+  kRotation,  ///< e_R = log(R_Bo^T R_Bd), regular at every pose.
+};
+
+/// V_Bo_dot (Sigma_o) for the command X_o_ddot = X_d_ddot + K_v (X_d_dot - X_o_dot) + K_p (X_d - X_o), (55):
+/// V_Bo_dot = P^-1 X_o_ddot + d/dt(P^-1) X_o_dot.
+/// @throws std::logic_error unless the grasp's state was set by X_o.
+Vector6d CalcTrackingAcceleration(const ObjectGains& gains, const GraspTerms& grasp,
+                                  const DesiredMotion& desired);
+
+/// V_Bo_dot (Sigma_o) for position errors in the world and the orientation error e_R of so3.h; both obey
+/// (57).
+/// @param V_Bo body velocity at pose X_Bo.
+Vector6d CalcTrackingAcceleration(const ObjectGains& gains, const Pose& X_Bo, const Vector6d& V_Bo,
+                                  const DesiredPose& desired);
+
+/// One of the two. kRotation also takes a grasp whose state was set by a pose.
+Vector6d CalcTrackingAcceleration(const ObjectGains& gains, OrientationFeedback feedback,
+                                  const GraspTerms& grasp, const DesiredMotion& desired);
+
+/// How far the object is from its desired motion, as twists in Sigma_o.
+struct ObjectErrors {
+  /// kAngles: P^-1 (X_d - X_o); kRotation: [R_Bo^T (p_d - p_o); e_R]. m, rad.
+  Vector6d e = Vector6d::Zero();
+  /// V_d - V_Bo, the desired body velocity less the object's. m/s, rad/s.
+  Vector6d V_error = Vector6d::Zero();
+  /// Derivative of the desired twist V_d along the object's motion, m/s^2, rad/s^2.
+  Vector6d V_d_dot = Vector6d::Zero();
+};
+
+/// kAngles: V_d = P^-1 X_d_dot; kRotation: V_d = [R_Bo^T p_d_dot; R_od omega_d]. At the object's own pose
+/// either is the desired frame's body velocity. @throws as CalcTrackingAcceleration.
+ObjectErrors CalcObjectErrors(OrientationFeedback feedback, const GraspTerms& grasp,
+                              const DesiredMotion& desired);
+
+// Everything that the paper's laws need of robot, object and contacts at one state.
+
+struct GraspModelOptions {
+  /// kAngles evaluates the object's terms in X_o besides, on one branch of the angles.
+  OrientationFeedback orientation = OrientationFeedback::kAngles;
+  Vector6d X_o_start = Vector6d::Zero();  ///< The angles' branch is the one nearest to this at first.
+  std::vector<Bond> bonds;                ///< None, or one for each fingertip.
+};
+
+/// M_bar', C_bar', F_bar', G, J_B' and their rates, all at one state. Nothing allocates after construction.
+class GraspModel {
+ public:
+  /// @param fingertips frames that hold the object. @param object, surface in Sigma_o; surface outlives this.
+  /// @throws as GraspTerms.
+  GraspModel(const RobotModel& model, std::span<const int> fingertips, const MassProperties& object,
+             const Surface& surface, const GraspModelOptions& options);
+
+  /// Evaluates all terms at a state. @throws what GraspTerms and CalcP throw.
+  void SetState(const MeasuredState& state);
+
+  /// The angles' branch is the one nearest to that of `other` at the next state.
+  void Follow(const GraspModel& other) { X_o_ = other.X_o_; }
+
+  [[nodiscard]] const ModelTerms& robot() const { return robot_; }
+  [[nodiscard]] const GraspTerms& grasp() const { return grasp_; }
+  /// Whether X_o and the terms in it are evaluated.
+  [[nodiscard]] bool has_coordinates() const { return orientation_ == OrientationFeedback::kAngles; }
+
+ private:
+  OrientationFeedback orientation_;
+  ModelTerms robot_;
+  GraspTerms grasp_;
+  Vector6d X_o_;  // of the last state, to stay on one branch of the angles
+};
+
+/// Two of them by turns: what was evaluated at one step can be read while the next one is evaluated.
+class AlternatingModel {
+ public:
+  explicit AlternatingModel(const GraspModel& model) : models_{model, model} {}
+
+  /// Sets the state as GraspModel::SetState does; the model of the previous call is kept unchanged.
+  void SetState(const MeasuredState& state) {
+    const GraspModel& last = now();
+    now_ = 1 - now_;
+    models_[now_].Follow(last);
+    models_[now_].SetState(state);
+  }
+  /// The one that was evaluated last.
+  [[nodiscard]] const GraspModel& now() const { return models_[now_]; }
+
+ private:
+  std::array<GraspModel, 2> models_;
+  size_t now_ = 0;
 };
 
 }  // namespace dexcheck

@@ -4,14 +4,14 @@
 #include <optional>
 
 #include "controller/common/types.h"
-#include "controller/control/actuation.h"
 #include "controller/control/baseline_law.h"
 #include "controller/control/controller.h"
-#include "controller/control/grasp_model.h"
+#include "controller/control/grasp_terms.h"
 #include "controller/control/joint_motion.h"
 #include "controller/control/stance.h"
 #include "controller/control/trajectory_controller.h"
 #include "controller/dynamics/model_terms.h"
+#include "controller/model/platform.h"
 
 namespace dexcheck {
 

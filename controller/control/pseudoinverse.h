@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/common/gram_matrix.h"
+#include "controller/common/linear_algebra.h"
 #include "controller/common/types.h"
 
 namespace dexcheck {

@@ -6,7 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
-#include "controller/control/grasp_controller.h"
+#include "controller/control/trajectory_controller.h"
 #include "controller/object/so3.h"
 
 namespace dexcheck {

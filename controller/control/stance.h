@@ -5,7 +5,7 @@
 
 #include <vector>
 
-#include "controller/contact/ground_contacts.h"
+#include "controller/contact/grasp_map.h"
 #include "controller/control/joint_motion.h"
 #include "controller/grasp/grasp_force.h"
 

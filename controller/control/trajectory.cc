@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 
 namespace dexcheck {
 

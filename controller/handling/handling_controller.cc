@@ -1,6 +1,6 @@
 #include "controller/handling/handling_controller.h"
 
-#include "controller/control/object_tracking.h"
+#include "controller/control/grasp_terms.h"
 
 namespace dexcheck {
 namespace {

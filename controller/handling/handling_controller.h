@@ -10,9 +10,8 @@
 #include <vector>
 
 #include "controller/control/computed_torque.h"
-#include "controller/control/grasp_controller.h"
-#include "controller/control/grasp_model.h"
 #include "controller/control/grasp_terms.h"
+#include "controller/control/trajectory_controller.h"
 
 namespace dexcheck {
 

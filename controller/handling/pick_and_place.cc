@@ -6,7 +6,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/grasp/serial_chain.h"
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 
 namespace dexcheck {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 
 namespace dexcheck {
 

@@ -1,7 +1,7 @@
 #include "controller/object/object_dynamics.h"
 
 #include "controller/common/errors.h"
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 
 namespace dexcheck {
 namespace {

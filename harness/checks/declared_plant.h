@@ -6,7 +6,7 @@
 #include <span>
 
 #include "controller/control/controller.h"
-#include "controller/control/grasp_model.h"
+#include "controller/control/grasp_terms.h"
 #include "harness/checks/step_record.h"
 #include "harness/plant/disturbances.h"
 #include "harness/plant/motor_drive.h"

@@ -6,9 +6,9 @@
 #include <optional>
 #include <span>
 
-#include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/dynamics/tree_factor.h"
+#include "controller/model/platform.h"
 #include "harness/checks/law_inputs.h"
 #include "harness/checks/step_analysis.h"
 #include "harness/checks/step_record.h"

@@ -17,9 +17,9 @@
 
 #include "controller/common/types.h"
 #include "controller/control/computed_torque.h"
-#include "controller/control/grasp_controller.h"
-#include "controller/control/object_tracking.h"
+#include "controller/control/grasp_terms.h"
 #include "controller/control/trajectory.h"
+#include "controller/control/trajectory_controller.h"
 
 namespace dexcheck {
 

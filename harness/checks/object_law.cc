@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "controller/control/trajectory.h"
-#include "controller/object/euler_zyz.h"
 #include "controller/object/so3.h"
 #include "harness/base/worst.h"
 #include "harness/checks/baseline_reference.h"

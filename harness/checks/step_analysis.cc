@@ -9,7 +9,7 @@
 
 #include "harness/base/worst.h"
 #include "harness/comparison/rounding_scales.h"
-#include "harness/plant/wheel_rates.h"
+#include "harness/plant/plant.h"
 
 namespace dexcheck {
 namespace {

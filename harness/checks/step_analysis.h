@@ -12,9 +12,9 @@
 #include <optional>
 #include <utility>
 
-#include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/handling/handling_controller.h"
+#include "controller/model/platform.h"
 #include "harness/checks/constraint_law.h"
 #include "harness/checks/declared_plant.h"
 #include "harness/checks/step_record.h"

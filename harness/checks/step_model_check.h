@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "controller/control/grasp_controller.h"
+#include "controller/control/trajectory_controller.h"
 #include "harness/comparison/term_comparison.h"
 #include "harness/descriptions/analytic_provider.h"
 #include "harness/descriptions/engine_provider.h"

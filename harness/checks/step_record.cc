@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "controller/object/euler_zyz.h"
 #include "controller/object/so3.h"
 #include "harness/base/worst.h"
 

@@ -8,7 +8,7 @@
 
 #include "controller/contact/contact_geometry.h"
 #include "controller/control/controller.h"
-#include "controller/control/grasp_model.h"
+#include "controller/control/grasp_terms.h"
 #include "harness/base/worst.h"
 #include "harness/plant/motor_drive.h"
 #include "harness/plant/plant.h"

@@ -13,7 +13,7 @@
 #include "harness/base/interrupts.h"
 #include "harness/base/process_pool.h"
 #include "harness/base/version.h"
-#include "harness/cli/terminal.h"
+#include "harness/cli/report.h"
 
 namespace dexcheck::cli {
 namespace {

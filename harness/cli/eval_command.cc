@@ -14,16 +14,16 @@
 #include "controller/contact/grasp_map.h"
 #include "controller/contact/shapes.h"
 #include "controller/contact/surface.h"
-#include "controller/control/grasp_controller.h"
+#include "controller/control/trajectory_controller.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/grasp/force_closure.h"
 #include "controller/model/parameter_reader.h"
 #include "controller/model/platform.h"
-#include "controller/object/euler_zyz.h"
 #include "controller/object/object_dynamics.h"
+#include "controller/object/so3.h"
 #include "harness/base/files.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
+#include "harness/cli/report.h"
 #include "harness/cli/run_folder.h"
 #include "harness/descriptions/analytic_provider.h"
 #include "harness/descriptions/engine_provider.h"
@@ -285,7 +285,7 @@ void AddContactTerms(const ModelTerms& terms, const State& state, Json* out) {
   Json list = Json::array();
   for (Eigen::Index i = 0; i < count; ++i) {
     const int frame = contacts.fingertips[static_cast<size_t>(i)];
-    const Frame& tip = model.frames()[static_cast<size_t>(frame)];
+    const Frame& tip = model.frame(frame);
     const Sphere fingertip(*tip.sphere_radius);
     const Pose X_OF = X_Bo.inverse() * terms.CalcFramePose(frame);
     const std::string entry = fmt::format("{}[{}]: ", has_points ? "contact_points" : "kappa", i);

@@ -13,9 +13,8 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
+#include "harness/cli/report.h"
 #include "harness/cli/run_folder.h"
-#include "harness/cli/terminal.h"
 #include "harness/log/log_reader.h"
 #include "harness/log/mcap_writer.h"
 

@@ -8,7 +8,7 @@
 #include "harness/base/console.h"
 #include "harness/base/files.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
+#include "harness/cli/report.h"
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/engine/engine.h"

@@ -16,7 +16,7 @@
 #include "harness/recordings/compare_recordings.h"
 #include "harness/recordings/judgement_verdict.h"
 #include "harness/recordings/write_corrections.h"
-#include "harness/report/judge_page.h"
+#include "harness/report/page.h"
 
 namespace dexcheck::cli {
 namespace {

@@ -19,12 +19,10 @@
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
+#include "harness/cli/report.h"
 #include "harness/cli/run_folder.h"
-#include "harness/cli/terminal.h"
 #include "harness/report/run_data.h"
 #include "renders/video.h"
-#include "renders/video_writer.h"
 
 namespace dexcheck::cli {
 namespace {

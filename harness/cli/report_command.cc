@@ -5,10 +5,9 @@
 #include <string>
 
 #include "harness/cli/commands.h"
-#include "harness/cli/output_file.h"
+#include "harness/cli/report.h"
 #include "harness/cli/run_folder.h"
 #include "harness/report/page.h"
-#include "harness/report/tex_table.h"
 
 namespace dexcheck::cli {
 namespace {

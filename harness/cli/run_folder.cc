@@ -20,8 +20,7 @@
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/base/worst.h"
-#include "harness/cli/output_file.h"
-#include "harness/cli/terminal.h"
+#include "harness/cli/report.h"
 #include "harness/engine/machine.h"
 #include "harness/engine/mjcf_file.h"
 #include "harness/report/run_data.h"
@@ -86,14 +85,6 @@ void RequireFile(const Scenario& scenario, const char* key, const std::string& f
       fmt::format("{}: {}: {}: cannot be read: {}", scenario.source, key, file, std::strerror(errno)));
 }
 
-ScenarioFiles OpenWhole(const std::filesystem::path& path, const std::vector<std::string>& overrides,
-                        std::uint64_t seed) {
-  ScenarioFiles files = Open(path, Supersede(path, overrides), seed);
-  RequireFile(files.scenario, "model.file", files.scenario.model_file);
-  RequireFile(files.scenario, "plant.mjcf", files.scenario.mjcf_file);
-  return files;
-}
-
 /// Puts a key's line into a table of the text; an own table at its end when it has none.
 void InsertKey(const std::string& table, const std::string& line, std::string* text) {
   const std::string header = "[" + table + "]\n";
@@ -109,7 +100,11 @@ void InsertKey(const std::string& table, const std::string& line, std::string* t
 
 ScenarioFiles FindScenario(const std::string& name_or_file, const std::vector<std::string>& overrides,
                            std::uint64_t seed) {
-  return OpenWhole(kScenarios.Find(name_or_file), overrides, seed);
+  const std::filesystem::path path = kScenarios.Find(name_or_file);
+  ScenarioFiles files = Open(path, Supersede(path, overrides), seed);
+  RequireFile(files.scenario, "model.file", files.scenario.model_file);
+  RequireFile(files.scenario, "plant.mjcf", files.scenario.mjcf_file);
+  return files;
 }
 
 void RequireFree(const std::filesystem::path& folder) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "harness/base/files.h"
+#include "harness/cli/report.h"
 #include "harness/log/log_content.h"
 #include "harness/log/log_reader.h"
 #include "harness/run/run_recorder.h"
@@ -107,5 +108,11 @@ bool IsTomlFile(const std::string& name);
 /// Copies a shipped scenario with its robot into a folder of its own. @param out empty: named after it.
 /// @returns the exit code. @throws InputError when there is none of that name, or files cannot be written.
 int CopyScenario(const std::string& name, const std::string& out);
+
+/// Returns a run's verdict, and below it tracking, checks, speed, and where the files are.
+/// @param summary of the run. @param folder empty when nothing was written. @param all
+/// whether each check has a line, and not each category and what fails of it.
+Report MakeRunReport(const Setup& setup, const ClosedLoop& loop, const RunResult& result, const Json& summary,
+                     const std::string& folder, bool all);
 
 }  // namespace dexcheck::cli

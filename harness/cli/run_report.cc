@@ -1,5 +1,3 @@
-#include "harness/cli/run_report.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -12,6 +10,7 @@
 #include "harness/base/bounded_json.h"
 #include "harness/base/check_record.h"
 #include "harness/checks/check_table.h"
+#include "harness/cli/run_folder.h"
 
 namespace dexcheck::cli {
 namespace {

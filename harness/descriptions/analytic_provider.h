@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "controller/dynamics/model_terms.h"
-#include "controller/object/euler_zyz.h"
 #include "controller/object/object_dynamics.h"
+#include "controller/object/so3.h"
 #include "harness/descriptions/dynamics_provider.h"
 
 namespace dexcheck {

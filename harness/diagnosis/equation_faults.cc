@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <utility>
 
-#include "controller/contact/adjoint.h"
 #include "controller/contact/contact_geometry.h"
 #include "controller/model/platform.h"
 #include "controller/object/object_dynamics.h"
+#include "controller/object/so3.h"
 
 namespace dexcheck {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "controller/control/grasp_model.h"
+#include "controller/control/grasp_terms.h"
 
 namespace dexcheck {
 

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "controller/control/actuation.h"
+#include "controller/model/platform.h"
 #include "harness/checks/judged_law.h"
 #include "harness/scenario/setup.h"
 

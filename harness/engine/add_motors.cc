@@ -94,7 +94,12 @@ std::map<std::string, double> FindForceRanges(const MjcfFile& mjcf) {
 std::vector<std::string> ListNewerForces(const MjcfFile& mjcf) {
   const XMLElement* const root = mjcf.root();
   const DefaultClasses classes(root);
-  const std::vector<std::string> attributes = ListNewerOfActuators();
+  std::vector<std::string> attributes;
+  for (const NewerWord& word : kNewerWords) {
+    if (word.elements != "*" || word.effect != MjcfEffect::kActuators) continue;
+    std::istringstream names{std::string(word.attributes)};
+    for (std::string name; names >> name;) attributes.push_back(name);
+  }
   std::vector<std::string> forces;
   for (const XMLElement* section : ListChildren(root, "actuator")) {
     for (const XMLElement* actuator : ListChildren(section)) {

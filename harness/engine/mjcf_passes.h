@@ -7,14 +7,24 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "harness/engine/engine.h"
 #include "harness/engine/mjcf_file.h"
 
 namespace dexcheck {
+
+/// Loads an MJCF for drawing only. A model whose moving parts can be seen stays as it is. Where all shapes
+/// that move are in groups that the engine hides, they are shown. A robot with shapes on less than half of
+/// its links, as in descriptions made for dynamics, gets rods from each body to the bodies that hang on it,
+/// to its sites, and to the centre of mass of the last ones, and balls at its joints. A model without lights
+/// gets a brighter headlight. Bodies, joints and sites keep their numbers.
+/// @param mjcf gets the rods and balls. @throws InputError as LoadMjcf.
+MjModelPtr LoadVisible(MjcfFile* mjcf);
 
 /// Makes an MJCF readable for this program's engine: CheckNumbers, LeaveOutNewerWords, LeaveOutAssets.
 void AdaptMjcf(MjcfFile* mjcf);
@@ -83,6 +93,14 @@ std::vector<std::string> ExcludeBaseContacts(MjcfFile* mjcf);
 /// first pose, which no motion avoids. @returns "link_1 and link_3" of each. @throws as AddMotors.
 std::vector<std::string> ExcludeOverlaps(const std::vector<std::map<std::string, double>>& poses,
                                          bool with_world, MjcfFile* mjcf);
+
+/// Returns a copy of a compiled model in which these geoms touch as well, as if the MJCF had a `pair` of
+/// three dimensions for each: sliding friction is the larger one of the two geoms', as the engine mixes it,
+/// and stiffness the default's.
+/// @param model of the MJCF; its numbers may have been changed since.
+/// @throws InputError when the model lets geoms touch by contype and conaffinity, whose order counts.
+MjModelPtr AddContactPairs(const mjModel& model, std::span<const std::pair<int, int>> geoms,
+                           const std::filesystem::path& mjcf);
 
 /// Returns the least and the largest force of an actuator at its joint, N m or N: by its forcerange and, for
 /// a plain motor, by its ctrlrange, times its gear; none when neither limits it.

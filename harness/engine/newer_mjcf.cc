@@ -1,5 +1,7 @@
 #include <mujoco/mujoco.h>
 
+#include <algorithm>
+#include <array>
 #include <map>
 #include <memory>
 #include <new>
@@ -96,6 +98,25 @@ const OlderWord kOlderWords[] = {
     {"flag", "passive", {"spring", "damper"}},
     {"flag", "sensornoise", {}},
 };
+
+/// "looks, sensors or memory", "contacts, solver or time steps", "forces of actuators", "dynamics".
+const char* NameOf(MjcfEffect effect) {
+  constexpr std::array<const char*, 4> kNames = {"looks, sensors or memory", "contacts, solver or time steps",
+                                                 "forces of actuators", "dynamics"};
+  return kNames.at(static_cast<size_t>(effect));
+}
+
+/// The word's entry; nullptr when it is not known. @param attribute empty for the element itself.
+const NewerWord* FindNewerWord(std::string_view element, std::string_view attribute) {
+  const auto find = [&](std::string_view name) -> const NewerWord* {
+    const auto* const found = std::ranges::find_if(kNewerWords, [&](const NewerWord& word) {
+      return IsAmong(word.elements, name) && IsAmong(word.attributes, attribute);
+    });
+    return found == std::end(kNewerWords) ? nullptr : found;
+  };
+  const NewerWord* const own = find(element);
+  return own != nullptr || attribute.empty() ? own : find("*");
+}
 
 bool IsZero(std::string_view text) { return text.find_first_of("123456789") == std::string_view::npos; }
 

@@ -1,4 +1,3 @@
-#include "harness/engine/visible_model.h"
 
 #include <fmt/format.h>
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "controller/control/actuation.h"
 #include "controller/control/controller.h"
+#include "controller/model/platform.h"
 #include "harness/checks/judged_law.h"
 #include "harness/diagnosis/equation_faults.h"
 #include "harness/diagnosis/law_entries.h"

@@ -2,10 +2,15 @@
 
 // Content of a log except its rows: the signals, texts and files, as plain data.
 
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <map>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "harness/base/files.h"
 
 namespace dexcheck {
 
@@ -69,5 +74,32 @@ std::string RenameSummary(const std::string& summary);
 
 /// A scenario, a robot, or overrides with today's keys.
 std::string RenameKeys(const std::string& toml);
+
+// The log as bytes in a file. HDF5 writes everything but the numbers once and closes the file; after that
+// only these are written, in place, so that a process that dies cannot leave a file that HDF5 does not open.
+
+/// @throws InputError "PATH: cannot be written: reason", the reason from the system's error number.
+[[noreturn]] void FailToWrite(const std::filesystem::path& path, int error);
+/// @throws InputError "PATH: cannot be read: reason".
+[[noreturn]] void FailToRead(const std::filesystem::path& path, int error);
+
+/// Writes all bytes at the offset. @throws InputError as FailToWrite of this name.
+void WriteAt(const std::string& name, int descriptor, const void* bytes, size_t count, std::uint64_t offset);
+
+/// Copies bytes between files. @throws InputError when that fails.
+void CopyBytes(const std::string& name, int from, std::uint64_t from_offset, int to, std::uint64_t to_offset,
+               size_t count);
+
+/// The root's attribute that says how a log is laid out and which names it uses; logs of format 1 have none.
+inline constexpr const char* kFormatAttribute = "format";
+inline constexpr const char* kLogFormat = "dexcheck log 2";
+
+/// Writes a log with room for `rows` rows of each signal; times are NaN, which marks rows not written, other
+/// numbers zero. `path` must exist.
+/// @param name in messages.
+/// @returns where each signal's first row lies, from the file's begin; 0 without rows.
+/// @throws InputError when the file cannot be written.
+std::vector<std::uint64_t> WriteLogFile(const std::filesystem::path& path, const std::string& name,
+                                        const LogContent& content, long rows);
 
 }  // namespace dexcheck

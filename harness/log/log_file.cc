@@ -1,5 +1,3 @@
-#include "harness/log/log_file.h"
-
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -15,6 +13,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/log/hdf5_handle.h"
+#include "harness/log/log_content.h"
 
 namespace dexcheck {
 namespace {

@@ -19,7 +19,7 @@
 #include "harness/base/console.h"
 #include "harness/base/files.h"
 #include "harness/log/hdf5_handle.h"
-#include "harness/log/log_file.h"
+#include "harness/log/log_content.h"
 
 namespace dexcheck {
 namespace {
@@ -340,11 +340,8 @@ void LogReader::ExtractFiles(const std::string& group, const std::filesystem::pa
   ShowFolderAs(folder.string(), path_.string());
   for (const std::string& name : ListFiles(group)) {
     const std::filesystem::path path = folder / name;
-    MakeFolder(path.parent_path());
     if (Exists(path)) FailToWrite(path, EEXIST);
-    PartialFile file(path);
-    file.Write(ReadFile(group, name));
-    file.Commit();
+    WriteFile(path, ReadFile(group, name));
   }
 }
 

@@ -12,7 +12,6 @@
 
 #include "harness/base/files.h"
 #include "harness/log/log_content.h"
-#include "harness/log/log_file.h"
 
 namespace dexcheck {
 

@@ -5,7 +5,7 @@
 
 #include "harness/engine/map_vector.h"
 #include "harness/engine/velocity_map.h"
-#include "harness/plant/wheel_rates.h"
+#include "harness/plant/plant.h"
 
 namespace dexcheck {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "controller/common/text.h"
-#include "harness/plant/wheel_rates.h"
+#include "harness/plant/plant.h"
 
 namespace dexcheck {
 namespace {

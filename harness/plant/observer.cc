@@ -6,7 +6,7 @@
 
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
-#include "harness/plant/wheel_rates.h"
+#include "harness/plant/plant.h"
 
 namespace dexcheck {
 namespace {

@@ -8,7 +8,7 @@
 #include "controller/object/so3.h"
 #include "harness/engine/map_vector.h"
 #include "harness/plant/disturbances.h"
-#include "harness/plant/wheel_rates.h"
+#include "harness/plant/plant.h"
 
 namespace dexcheck {
 namespace {

@@ -19,10 +19,10 @@
 #include <vector>
 
 #include "controller/contact/contact_geometry.h"
-#include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/grasp_terms.h"
 #include "controller/dynamics/model_terms.h"
+#include "controller/model/platform.h"
 #include "harness/engine/velocity_map.h"
 #include "harness/plant/plant.h"
 

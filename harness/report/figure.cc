@@ -80,9 +80,7 @@ void WriteData(const Figure& figure, const Thinning& thinning, const std::filesy
       text += CanBeDrawn(figure, value) ? fmt::format(",{:.7g}", value) : ",NaN";
     }
   }
-  PartialFile file(folder / (figure.name + ".csv"));
-  file.Write(text + "\n");
-  file.Commit();
+  WriteFile(folder / (figure.name + ".csv"), text + "\n");
 }
 
 std::string PlotCurves(const Figure& figure) {

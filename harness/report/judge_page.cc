@@ -1,5 +1,3 @@
-#include "harness/report/judge_page.h"
-
 #include <algorithm>
 #include <limits>
 #include <memory>
@@ -10,8 +8,8 @@
 #include "harness/descriptions/description_writer.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/engine/mjcf_passes.h"
-#include "harness/engine/visible_model.h"
 #include "harness/engine/xml.h"
+#include "harness/report/page.h"
 #include "harness/report/page_frame.h"
 
 namespace dexcheck {

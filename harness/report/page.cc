@@ -21,11 +21,9 @@
 #include "harness/checks/check_table.h"
 #include "harness/checks/failure_cause.h"
 #include "harness/report/page_frame.h"
-#include "harness/report/run_figures.h"
-#include "harness/run/run_summary.h"
+#include "harness/run/runner.h"
 #include "renders/renderer.h"
 #include "renders/video.h"
-#include "renders/video_writer.h"
 #include "renders/viewpoint.h"
 
 namespace dexcheck {

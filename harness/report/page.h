@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "harness/corrections/printed_robot.h"
+#include "harness/recordings/judge_recordings.h"
 #include "harness/report/figure.h"
 #include "harness/report/replay.h"
 #include "harness/report/run_data.h"
@@ -84,5 +85,39 @@ ReportFiles MakeReportFiles(const std::filesystem::path& run_dir);
 /// @throws InputError, one line, when there is no log, or one without rows, or a file cannot be written.
 void WriteRunReport(const std::filesystem::path& run_dir, const ReportFiles& files,
                     const SceneMaker& make_scene = MakeRunScene);
+
+/// A table for LaTeX with booktabs: tracking errors, and of each category of checks the one nearest its
+/// bound. Its caption names the verdict, the program's commit and the command.
+/// @throws InputError that names the log when its summary is none.
+std::string MakeTexTable(const RunData& run);
+
+/// Panels of the paper's Figures 12 and 13, as far as the log has their signals, and plots beside them: the
+/// object's error, the other torques, how far friction is used.
+std::vector<Figure> MakeMotionFigures(const RunData& run);
+
+/// One figure for each category of checks that was evaluated: its checks' values as fractions of their
+/// bounds.
+std::vector<Figure> MakeResidualFigures(const RunData& run);
+
+// The motion of a judged recording, for the replay in its page.
+
+/// Time from which a page counts a recording's times: its begin where it is one of several, or has a clock's
+/// time; otherwise 0.
+double FindTimeBegin(const RecordingJudgement& judgement, int recording);
+
+/// The first recording's: with the shapes of an MJCF, otherwise with rods between the joints. None for a
+/// robot with ball joints or a base that moves.
+/// @param file that the model was read from.
+std::optional<ReplayData> MakeMotionReplay(const RobotModel& model, const std::filesystem::path& file,
+                                           const RecordingJudgement& judgement);
+
+// The page of a judged recording.
+
+/// A whole HTML document that loads nothing: the verdict, the causes and those that the motion does not
+/// distinguish, each joint's torques over time with their residuals and the noise, and the recorded motion.
+/// @param model that judged. @param json of the judgement, as `judge --json` writes it.
+/// @param replay of the first recording; none where it cannot be drawn.
+std::string MakeJudgePage(const RobotModel& model, const RecordingJudgement& judgement,
+                          const nlohmann::ordered_json& json, const ReplayData* replay = nullptr);
 
 }  // namespace dexcheck

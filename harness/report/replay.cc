@@ -6,11 +6,11 @@
 #include <map>
 #include <set>
 
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
+#include "harness/corrections/printed_robot.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "renders/renderer.h"
-#include "renders/run_frames.h"
 #include "renders/viewpoint.h"
 
 namespace dexcheck {
@@ -32,12 +32,6 @@ Json ToJson(const Eigen::Ref<const VectorXd>& values) {
   Json json = Json::array();
   for (const double value : values) json.push_back(Round(value, kShapeUnit));
   return json;
-}
-
-/// w, x, y, z.
-Eigen::Vector4d ToWxyz(const Matrix3d& R) {
-  const Eigen::Quaterniond q(R);
-  return {q.w(), q.x(), q.y(), q.z()};
 }
 
 class ReplayMaker {
@@ -125,7 +119,7 @@ class ReplayMaker {
         {"type", name->second},
         {"size", ToJson(Eigen::Map<const Vector3d>(model_.geom_size + 3 * geom))},
         {"position", ToJson(X_PG.translation())},
-        {"quaternion", ToJson(ToWxyz(X_PG.linear()))},
+        {"quaternion", ToJson(ToQuaternion(X_PG.linear()))},
         {"color", {Round(color[0], 1e3), Round(color[1], 1e3), Round(color[2], 1e3), Round(color[3], 1e3)}}};
     if (material >= 0 && model_.mat_emission[material] > 0.0F) shape["glow"] = true;
     if (model_.geom_type[geom] == mjGEOM_MESH) {
@@ -224,7 +218,7 @@ class ReplayMaker {
     }
     json_["quaternions"] = bytes_.size();
     for (const Pose& X : poses) {
-      for (const double x : ToWxyz(X.linear()))
+      for (const double x : ToQuaternion(X.linear()))
         Append(static_cast<std::int16_t>(std::lround(kQuaternionUnit * x)));
     }
   }
@@ -262,7 +256,7 @@ class ReplayMaker {
     RowMatrixXd quaternions(run_.rows(), 4);
     for (const long row : rows_) {
       const Vector3d zyz = run_.desired_angles.row(row).transpose();
-      quaternions.row(row) = ToWxyz(CalcRotationZyz(zyz)).transpose();
+      quaternions.row(row) = ToQuaternion(CalcRotationZyz(zyz)).transpose();
     }
     object["desired_quaternions"] = AddRows(quaternions);
   }

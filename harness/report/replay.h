@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "renders/run_frames.h"
+#include "renders/viewpoint.h"
 
 namespace dexcheck {
 

@@ -11,7 +11,6 @@
 #include "harness/base/files.h"
 #include "harness/engine/mjcf_file.h"
 #include "harness/engine/mjcf_passes.h"
-#include "harness/engine/visible_model.h"
 #include "harness/scenario/runnable_robot.h"
 
 namespace dexcheck {

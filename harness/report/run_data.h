@@ -10,7 +10,7 @@
 #include "harness/base/check_record.h"
 #include "harness/engine/engine.h"
 #include "harness/log/log_reader.h"
-#include "renders/run_frames.h"
+#include "renders/viewpoint.h"
 
 namespace dexcheck {
 

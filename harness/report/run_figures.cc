@@ -1,10 +1,10 @@
-#include "harness/report/run_figures.h"
-
 #include <algorithm>
 #include <functional>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "harness/report/page.h"
 
 namespace dexcheck {
 namespace {

@@ -1,5 +1,3 @@
-#include "harness/report/tex_table.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +6,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/base/bounded_json.h"
+#include "harness/report/page.h"
 
 namespace dexcheck {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "controller/common/text.h"
-#include "harness/plant/velocity_filter.h"
+#include "harness/plant/sensing.h"
 
 namespace dexcheck {
 namespace {

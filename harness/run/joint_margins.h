@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "controller/control/joint_controller.h"
-#include "harness/run/run_summary.h"
+#include "harness/run/runner.h"
 #include "harness/run/sampled_loop.h"
 #include "harness/scenario/setup.h"
 

@@ -14,7 +14,7 @@
 #include "controller/common/text.h"
 #include "controller/control/joint_controller.h"
 #include "harness/base/watched_process.h"
-#include "harness/run/controller_hosts.h"
+#include "harness/run/own_controller.h"
 
 namespace dexcheck {
 namespace {

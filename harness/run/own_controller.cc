@@ -8,7 +8,6 @@
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "harness/base/files.h"
-#include "harness/run/controller_hosts.h"
 
 namespace dexcheck {
 namespace {

@@ -14,7 +14,7 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/child_process.h"
-#include "harness/run/controller_hosts.h"
+#include "harness/run/own_controller.h"
 
 namespace dexcheck {
 namespace {

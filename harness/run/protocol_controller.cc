@@ -6,7 +6,7 @@
 
 #include "controller/control/joint_controller.h"
 #include "controller/model/platform.h"
-#include "harness/run/controller_hosts.h"
+#include "harness/run/own_controller.h"
 
 namespace dexcheck {
 namespace {

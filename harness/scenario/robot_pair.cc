@@ -9,7 +9,7 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/base/files.h"
 #include "harness/comparison/engine_constants.h"
-#include "harness/engine/contact_pairs.h"
+#include "harness/engine/mjcf_passes.h"
 #include "harness/engine/mujoco_release.h"
 
 namespace dexcheck {

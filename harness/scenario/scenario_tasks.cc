@@ -4,7 +4,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 #include "harness/scenario/scenario_reader.h"
 
 namespace dexcheck {

@@ -9,7 +9,7 @@
 #include "controller/contact/contact_geometry.h"
 #include "controller/contact/shapes.h"
 #include "controller/grasp/finger_placement.h"
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
 #include "harness/engine/mujoco_release.h"
@@ -38,10 +38,6 @@ ModelTerms MakeKinematics(const RobotModel& model, const VectorXd& q) {
   ModelTerms kinematics(model, Coordinates::kReduced);
   kinematics.SetState(q, VectorXd::Zero(model.num_velocities()));
   return kinematics;
-}
-
-double TipRadius(const RobotModel& model, int frame) {
-  return *model.frames()[static_cast<size_t>(frame)].sphere_radius;
 }
 
 VectorXd ReadPosture(const Scenario& scenario, const RobotModel& model) {
@@ -84,7 +80,7 @@ std::string FindContactPastRim(const GraspOptions& grasp, const RobotModel& mode
     // The object's outward normal points into the fingertip.
     const Vector3d n = start.X_Bo.linear() * surface.Evaluate(grasp.contacts[i]).R.col(2);
     const Matrix3d R_Bf = kinematics.CalcFramePose(hold.fingertips[i]).linear();
-    const Frame& tip = model.frames()[static_cast<size_t>(hold.fingertips[i])];
+    const Frame& tip = model.frame(hold.fingertips[i]);
     const double distance = CalcRimDistance(*tip.sphere_radius, *grasp.hemisphere, -(R_Bf.transpose() * n));
     if (distance >= 0.0) continue;
     return "the contact of " + Quote(tip.name) + " lies " + FormatNumber(-1e3 * distance, 3) +
@@ -121,7 +117,7 @@ void PlaceObject(const Pose& X_Bo, StartState* start) {
 
 ContactCoordinates FindTipContact(const RobotModel& model, int frame, const Surface& surface,
                                   const Pose& X_of) {
-  return FindContact(Sphere(TipRadius(model, frame)), surface, X_of).kappa;
+  return FindContact(Sphere(model.tip_radius(frame)), surface, X_of).kappa;
 }
 
 Hold FindHold(const Scenario& scenario, const RobotModel& model) {
@@ -130,7 +126,7 @@ Hold FindHold(const Scenario& scenario, const RobotModel& model) {
   for (const std::string& name : scenario.grasp.fingertips) {
     int frame = -1;
     for (const int tip : model.fingertips()) {
-      if (model.frames()[static_cast<size_t>(tip)].name == name) frame = tip;
+      if (model.frame(tip).name == name) frame = tip;
     }
     if (frame < 0) Fail(scenario, "grasp.fingertips", Quote(name) + " is no fingertip of the model");
     if (std::find(fingertips.begin(), fingertips.end(), frame) != fingertips.end()) {
@@ -140,7 +136,7 @@ Hold FindHold(const Scenario& scenario, const RobotModel& model) {
   }
   std::vector<int> users(static_cast<size_t>(model.num_joints()), 0);
   for (const int tip : fingertips) {
-    int joint = model.frames()[static_cast<size_t>(tip)].link;
+    int joint = model.frame(tip).link;
     for (; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent) {
       ++users[static_cast<size_t>(joint)];
     }
@@ -220,7 +216,7 @@ void MakeBonds(const Scenario& scenario, const Hold& hold, const Surface& surfac
     const Pose X_Bf = kinematics.CalcFramePose(tip);
     start->kappa.push_back(FindTipContact(model, tip, surface, start->X_Bo.inverse() * X_Bf));
     const ContactGeometry contact =
-        CalcContactGeometry(Sphere(TipRadius(model, tip)), surface, start->kappa.back());
+        CalcContactGeometry(Sphere(model.tip_radius(tip)), surface, start->kappa.back());
     start->bonds.push_back({contact.g_f_cf.translation(), contact.g_o_cf});
 
     const int body = m.site_bodyid[adapter.frame_sites()[static_cast<size_t>(tip)]];

@@ -198,9 +198,7 @@ class StateReader {
     CheckList(names, "fingers", static_cast<int>(fingertips->size()), "names");
     for (size_t i = 0; i < names.size(); ++i) {
       const std::string entry = "fingers[" + std::to_string(i) + "]";
-      const auto is_named = [&](int frame) {
-        return names[i] == model.frames()[static_cast<size_t>(frame)].name;
-      };
+      const auto is_named = [&](int frame) { return names[i] == model.frame(frame).name; };
       const auto found = std::find_if(model.fingertips().begin(), model.fingertips().end(), is_named);
       if (found == model.fingertips().end())
         Fail(entry, "must name a fingertip, got " + Abbreviate(names[i].dump()));

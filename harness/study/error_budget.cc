@@ -9,11 +9,11 @@
 #include <utility>
 
 #include "controller/common/errors.h"
-#include "controller/control/actuation.h"
 #include "controller/control/constrained_dynamics.h"
 #include "controller/control/controller.h"
-#include "controller/control/grasp_model.h"
+#include "controller/control/grasp_terms.h"
 #include "controller/control/trajectory.h"
+#include "controller/model/platform.h"
 #include "harness/base/byte_archive.h"
 #include "harness/base/process_pool.h"
 #include "harness/checks/step_record.h"

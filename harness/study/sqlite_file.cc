@@ -1,5 +1,3 @@
-#include "harness/study/sqlite_file.h"
-
 #include <sqlite3.h>
 #include <unistd.h>
 
@@ -12,6 +10,7 @@
 #include "harness/base/console.h"
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
+#include "harness/study/study_store.h"
 
 namespace dexcheck {
 namespace {

@@ -11,10 +11,23 @@
 #include "harness/study/error_budget.h"
 #include "harness/study/search.h"
 #include "harness/study/study_store.h"
-#include "harness/study/study_summary.h"
 #include "harness/study/trial.h"
 
 namespace dexcheck {
+
+/// Most trials whose numbers are in a page; of more the trials of points that a hash draws, and the best.
+constexpr size_t kMostShown = 20000;
+
+struct StudySummary {
+  /// The study, how far it has come, outcomes, findings, the best points and sensitivities. Its keys
+  /// are in the README.
+  nlohmann::ordered_json json;
+  /// Doubles, row by row, of the trials that are shown: the numbers of json["columns"].
+  std::string values;
+};
+
+/// Summarises all trials that are done.
+StudySummary SummariseStudy(const StudyStore& store);
 
 /// A point's objective as the user wrote it: of `maximize` with its own sign again.
 double ShowObjective(const Study& study, const JudgedPoint& point, size_t objective = 0);

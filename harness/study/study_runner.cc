@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <deque>
+#include <iterator>
 #include <limits>
-#include <set>
 #include <thread>
 #include <utility>
 
@@ -21,6 +21,10 @@ namespace {
 /// So often a trial is begun whose process is killed from outside every time.
 constexpr int kMostTries = 3;
 
+std::string Pack(const TrialResult& result) {
+  return PackBytes(result.outcome, result.metrics, result.failure);
+}
+
 /// A pool that stores what its trials come to. Claims and rows go into the database together, as many as fall
 /// into kTogether: a transaction waits for the disk, which costs more than a short trial.
 class TrialMaker {
@@ -29,8 +33,12 @@ class TrialMaker {
       : options_(options),
         store_(store),
         machine_(DescribeMachine()),
-        pool_(options.jobs, inputs.study.trial_time_limit,
-              [&](const Trial& trial) { return RunTrial(inputs, trial); }) {}
+        time_limit_(inputs.study.trial_time_limit),
+        pool_("a trial", options.jobs, time_limit_, [&](const std::string& request) {
+          Trial trial;
+          UnpackBytes(request, &trial.number, &trial.seed, &trial.parameters);
+          return Pack(RunTrial(inputs, trial));
+        }) {}
 
   /// Makes those of the trials that nobody else has. @param done is called with each row.
   void Run(const std::vector<Trial>& trials, const std::function<void(const TrialRow&)>& done) {
@@ -39,10 +47,12 @@ class TrialMaker {
       while (!options_.is_interrupted() && (!waiting_.empty() || !claimed_.empty() || !pool_.IsEmpty())) {
         ClaimSome();
         while (!pool_.IsFull() && !claimed_.empty()) {
-          pool_.Start(claimed_.front());
+          const Trial& next = claimed_.front();
+          pool_.Start(next.number, PackBytes(next.number, next.seed, next.parameters));
+          running_[next.number] = next;
           claimed_.pop_front();
         }
-        if (auto ended = pool_.Wait()) Take(&*ended);
+        if (const auto ended = pool_.Wait()) Take(*ended);
         if (Clock::now() - stored_ > kTogether) Store(done);
       }
       Store(done);
@@ -73,10 +83,19 @@ class TrialMaker {
     for (const long number : store_->Claim(numbers)) claimed_.push_back(some.at(number));
   }
 
-  void Take(EndedTrial* ended) {
-    if (ended->killed_from_outside && !GiveUp(ended)) return;
-    ended->row.machine = machine_;
-    rows_.push_back(std::move(ended->row));
+  void Take(const EndedJob& ended) {
+    TrialRow row{std::move(running_.extract(ended.number).mapped()), {}, machine_};
+    TrialResult& result = row.result;
+    if (ended.result) {
+      UnpackBytes(*ended.result, &result.outcome, &result.metrics, &result.failure);
+    } else {
+      result.outcome = ended.timed_out ? Outcome::kTimedOut : Outcome::kCrashed;
+      result.metrics.fill(std::numeric_limits<double>::quiet_NaN());
+      result.failure = ended.timed_out ? "it took more than trial_time_limit, " + FormatNumber(time_limit_) +
+                                             " s of processor time"
+                                       : ended.failure;
+    }
+    if (!ended.killed_from_outside || GiveUp(&row)) rows_.push_back(std::move(row));
   }
 
   void Store(const std::function<void(const TrialRow&)>& done) {
@@ -90,13 +109,13 @@ class TrialMaker {
 
   /// Whether a trial whose process was killed from outside is given up. With all others when it is this
   /// program that is ended; else it is tried once more, when others are done.
-  bool GiveUp(EndedTrial* ended) {
-    const Trial& trial = ended->row.trial;
+  bool GiveUp(TrialRow* row) {
+    const Trial& trial = row->trial;
     const bool again = ++tries_[trial.number] < kMostTries;
     if (again || options_.is_interrupted()) store_->Release({trial.number});
     if (again) waiting_.push_back(trial);
     if (again || options_.is_interrupted()) return false;
-    ended->row.result.failure += ", " + std::to_string(kMostTries) + " times";
+    row->result.failure += ", " + std::to_string(kMostTries) + " times";
     return true;
   }
 
@@ -110,12 +129,14 @@ class TrialMaker {
   const RunOptions& options_;
   StudyStore* store_;
   std::string machine_;
+  double time_limit_;  // s
   std::map<long, int> tries_;
+  std::map<long, Trial> running_;
   std::deque<Trial> waiting_, claimed_;
   std::vector<TrialRow> rows_;  // not stored yet
   size_t recent_ = 0;           // rows that were stored last
   Clock::time_point stored_ = Clock::now();
-  TrialPool pool_;
+  ProcessPool pool_;
 };
 
 }  // namespace
@@ -143,18 +164,16 @@ bool MakesRowsAgain(const StudyInputs& inputs, const std::vector<TrialRow>& rows
     if (!IsFailed(row.result.outcome)) good.push_back(&row);
   }
   if (good.empty()) return true;
-  const std::set<const TrialRow*> chosen = {good.front(), good[good.size() / 2], good.back()};
-  for (const TrialRow* row : chosen) {
-    // In a process of its own, as when it was made.
-    TrialPool pool(1, inputs.study.trial_time_limit,
-                   [&](const Trial& trial) { return RunTrial(inputs, trial); });
-    pool.Start(row->trial);
-    std::optional<EndedTrial> ended;
-    while (!ended) ended = pool.Wait();
-    ended->row.machine = DescribeMachine();
-    if (!IsSame(*row, ended->row)) return false;
-  }
-  return true;
+  const TrialRow* const chosen[] = {good.front(), good[good.size() / 2], good.back()};
+  bool are_same = true;
+  const auto run = [&](size_t i) { return Pack(RunTrial(inputs, chosen[i]->trial)); };
+  const auto take = [&](size_t i, const std::string& bytes) {
+    TrialRow again{chosen[i]->trial, {}, DescribeMachine()};
+    UnpackBytes(bytes, &again.result.outcome, &again.result.metrics, &again.result.failure);
+    are_same = IsSame(*chosen[i], again);
+  };
+  RunJobs("a trial", std::min(good.size(), std::size(chosen)), 1, run, take, [&] { return !are_same; });
+  return are_same;
 }
 
 void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore* store) {
@@ -176,38 +195,6 @@ void RunSearch(const StudyInputs& inputs, const RunOptions& options, StudyStore*
     read();
     if (made == 0 && !history.is_over()) std::this_thread::sleep_for(kPatience);
   }
-}
-
-TrialPool::TrialPool(int size, double time_limit, const std::function<TrialResult(const Trial&)>& run)
-    : time_limit_(time_limit), pool_("a trial", size, time_limit, [run](const std::string& request) {
-        Trial trial;
-        UnpackBytes(request, &trial.number, &trial.seed, &trial.parameters);
-        const TrialResult result = run(trial);
-        return PackBytes(result.outcome, result.metrics, result.failure);
-      }) {}
-
-void TrialPool::Start(const Trial& trial) {
-  pool_.Start(trial.number, PackBytes(trial.number, trial.seed, trial.parameters));
-  running_[trial.number] = trial;
-}
-
-std::optional<EndedTrial> TrialPool::Wait() {
-  const std::optional<EndedJob> job = pool_.Wait();
-  if (!job) return std::nullopt;
-  EndedTrial ended;
-  ended.killed_from_outside = job->killed_from_outside;
-  ended.row.trial = std::move(running_.extract(job->number).mapped());
-  TrialResult& result = ended.row.result;
-  if (job->result) {
-    UnpackBytes(*job->result, &result.outcome, &result.metrics, &result.failure);
-    return ended;
-  }
-  result.outcome = job->timed_out ? Outcome::kTimedOut : Outcome::kCrashed;
-  result.metrics.fill(std::numeric_limits<double>::quiet_NaN());
-  result.failure = job->timed_out ? "it took more than trial_time_limit, " + FormatNumber(time_limit_) +
-                                        " s of processor time"
-                                  : job->failure;
-  return ended;
 }
 
 }  // namespace dexcheck

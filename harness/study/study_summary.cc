@@ -1,4 +1,3 @@
-#include "harness/study/study_summary.h"
 
 #include <fmt/format.h>
 

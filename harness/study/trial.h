@@ -7,10 +7,10 @@
 
 #include "controller/model/robot_model.h"
 #include "harness/engine/engine.h"
-#include "harness/run/run_summary.h"
+#include "harness/run/runner.h"
 #include "harness/scenario/scenario.h"
+#include "harness/study/objective.h"
 #include "harness/study/study.h"
-#include "harness/study/trial_result.h"
 
 namespace dexcheck {
 

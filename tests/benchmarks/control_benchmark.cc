@@ -4,7 +4,7 @@
 
 #include "controller/control/computed_torque.h"
 #include "controller/control/constrained_dynamics.h"
-#include "controller/control/object_tracking.h"
+#include "controller/control/grasp_terms.h"
 #include "tests/common/paper_robot.h"
 #include "tests/controller/control/grasp_scene.h"
 

@@ -14,10 +14,9 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
-#include "renders/offscreen_context.h"
 #include "renders/renderer.h"
-#include "renders/run_frames.h"
 #include "renders/video.h"
+#include "renders/viewpoint.h"
 #include "tests/benchmarks/measured_time.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"

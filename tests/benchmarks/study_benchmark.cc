@@ -63,15 +63,9 @@ void Compare(int repetitions) {
       StudyStore::OpenOrCreate(folder.path() / "study.sqlite", IdentifyStudy(inputs), inputs.study);
   // The trials from `first` on, so many at a time.
   const auto run = [&](int jobs, size_t first, size_t count) {
-    TrialPool pool(jobs, 0.0, [&](const Trial& trial) { return RunTrial(inputs, trial); });
-    size_t next = first;
-    while (next < first + count || !pool.IsEmpty()) {
-      while (!pool.IsFull() && next < first + count) {
-        store.Claim({trials[next].number});
-        pool.Start(trials[next++]);
-      }
-      if (const auto ended = pool.Wait()) store.Add({ended->row});
-    }
+    const auto begin = trials.begin() + static_cast<std::ptrdiff_t>(first);
+    const RunOptions options{jobs, [] { return false; }, [](long) {}};
+    RunTrials(inputs, {begin, begin + static_cast<std::ptrdiff_t>(count)}, options, &store);
   };
   // So many trials of one worker against as many bare loops.
   constexpr size_t kCount = 8;

@@ -1,12 +1,11 @@
 // Shapes and text against their areas and places.
 
-#include "renders/canvas.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
 
 #include "controller/common/errors.h"
+#include "renders/overlay.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
 

@@ -5,7 +5,7 @@
 
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
-#include "renders/run_frames.h"
+#include "renders/viewpoint.h"
 
 namespace dexcheck::testing {
 namespace {

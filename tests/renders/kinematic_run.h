@@ -3,7 +3,7 @@
 #include <mujoco/mujoco.h>
 
 #include "renders/image.h"
-#include "renders/run_frames.h"
+#include "renders/viewpoint.h"
 
 namespace dexcheck::testing {
 

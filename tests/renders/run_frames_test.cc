@@ -1,5 +1,3 @@
-#include "renders/run_frames.h"
-
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -7,6 +5,7 @@
 
 #include "controller/common/errors.h"
 #include "harness/engine/engine.h"
+#include "renders/viewpoint.h"
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"

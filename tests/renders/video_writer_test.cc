@@ -1,7 +1,5 @@
 // Videos and pictures as ffprobe and ffmpeg see them.
 
-#include "renders/video_writer.h"
-
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -9,6 +7,7 @@
 #include <string>
 
 #include "controller/common/errors.h"
+#include "renders/video.h"
 #include "tests/common/files.h"
 #include "tests/common/full_disk.h"
 #include "tests/common/run_program.h"

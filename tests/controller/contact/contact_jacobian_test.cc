@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "controller/contact/adjoint.h"
 #include "controller/contact/grasp_map.h"
+#include "controller/object/so3.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/contact/test_finger.h"

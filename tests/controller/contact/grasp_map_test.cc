@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "controller/contact/adjoint.h"
+#include "controller/object/so3.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"
 #include "tests/controller/contact/test_finger.h"

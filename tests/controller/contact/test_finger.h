@@ -4,9 +4,9 @@
 
 #include <array>
 
-#include "controller/contact/adjoint.h"
 #include "controller/contact/contact_geometry.h"
 #include "controller/contact/grasp_map.h"
+#include "controller/object/so3.h"
 #include "tests/controller/contact/contact_fixtures.h"
 
 namespace dexcheck::testing {

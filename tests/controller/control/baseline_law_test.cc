@@ -10,7 +10,6 @@
 #include <random>
 
 #include "controller/control/constrained_dynamics.h"
-#include "controller/object/euler_zyz.h"
 #include "controller/object/so3.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"

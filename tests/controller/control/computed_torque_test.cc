@@ -9,7 +9,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/control/constrained_dynamics.h"
-#include "controller/control/object_tracking.h"
+#include "controller/control/grasp_terms.h"
 #include "controller/object/so3.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/common/matrix_near.h"

@@ -7,7 +7,6 @@
 #include <random>
 
 #include "controller/common/errors.h"
-#include "controller/control/actuation.h"
 #include "controller/model/platform.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"

@@ -14,10 +14,9 @@
 #include "controller/contact/contact_geometry.h"
 #include "controller/contact/shapes.h"
 #include "controller/control/grasp_terms.h"
-#include "controller/control/object_tracking.h"
 #include "controller/control/pseudoinverse.h"
 #include "controller/grasp/finger_placement.h"
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 #include "tests/common/paper_robot.h"
 
 namespace dexcheck::testing {

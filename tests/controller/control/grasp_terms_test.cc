@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "controller/contact/contact_geometry.h"
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 #include "tests/common/finite_difference.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/reduction_map.h"

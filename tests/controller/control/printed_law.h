@@ -2,13 +2,12 @@
 
 // The law (55) as printed, with matrices in X_o, and faulty versions of it.
 
-#include "controller/contact/adjoint.h"
 #include "controller/contact/grasp_map.h"
 #include "controller/control/grasp_terms.h"
-#include "controller/control/object_tracking.h"
 #include "controller/control/pseudoinverse.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/platform.h"
+#include "controller/object/so3.h"
 #include "tests/common/linear_algebra.h"
 #include "tests/controller/control/grasp_scene.h"
 

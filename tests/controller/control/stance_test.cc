@@ -8,7 +8,7 @@
 #include <random>
 
 #include "controller/control/constrained_dynamics.h"
-#include "controller/control/grasp_controller.h"
+#include "controller/control/trajectory_controller.h"
 #include "controller/model/parameter_reader.h"
 #include "tests/common/finite_difference.h"
 #include "tests/common/matrix_near.h"

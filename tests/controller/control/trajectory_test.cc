@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "controller/common/errors.h"
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 #include "tests/common/finite_difference.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"

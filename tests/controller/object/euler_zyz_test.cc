@@ -1,11 +1,10 @@
-#include "controller/object/euler_zyz.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "controller/common/errors.h"
+#include "controller/object/so3.h"
 #include "tests/common/matchers.h"
 #include "tests/common/matrix_near.h"
 #include "tests/common/throws.h"

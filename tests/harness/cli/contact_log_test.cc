@@ -7,7 +7,7 @@
 
 #include "controller/contact/shapes.h"
 #include "controller/dynamics/model_terms.h"
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 #include "harness/log/log_reader.h"
 #include "tests/common/paper_robot.h"
 #include "tests/harness/cli/dexcheck_program.h"

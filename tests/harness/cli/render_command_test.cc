@@ -4,7 +4,7 @@
 #include <map>
 #include <utility>
 
-#include "renders/video_writer.h"
+#include "renders/video.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/report/replay_run.h"
 

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "controller/object/euler_zyz.h"
+#include "controller/object/so3.h"
 #include "harness/descriptions/engine_provider.h"
 #include "tests/common/matrix_near.h"
 

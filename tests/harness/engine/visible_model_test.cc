@@ -1,13 +1,12 @@
 // Robots without shapes are drawn as skeletons.
 
-#include "harness/engine/visible_model.h"
-
 #include <gtest/gtest.h>
 
 #include <string>
 
 #include "controller/common/types.h"
 #include "harness/engine/engine.h"
+#include "harness/engine/mjcf_passes.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"
 

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "harness/descriptions/read_description.h"
-#include "harness/report/judge_page.h"
+#include "harness/report/page.h"
 #include "tests/common/browser.h"
 #include "tests/common/files.h"
 #include "tests/common/paths.h"

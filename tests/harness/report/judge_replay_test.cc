@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "harness/descriptions/read_description.h"
-#include "harness/report/judge_page.h"
+#include "harness/report/page.h"
 #include "tests/common/paths.h"
 
 namespace dexcheck::testing::judge_replay_test {

@@ -10,7 +10,7 @@
 #include "harness/report/page.h"
 #include "harness/report/run_comparison.h"
 #include "harness/report/run_data.h"
-#include "renders/video_writer.h"
+#include "renders/video.h"
 #include "tests/common/browser.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"

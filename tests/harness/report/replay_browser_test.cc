@@ -8,8 +8,8 @@
 
 #include "harness/report/page.h"
 #include "renders/renderer.h"
-#include "renders/run_frames.h"
-#include "renders/video_writer.h"
+#include "renders/video.h"
+#include "renders/viewpoint.h"
 #include "tests/common/browser.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/report/replay_run.h"

@@ -16,8 +16,6 @@
 #include "controller/common/errors.h"
 #include "harness/report/page.h"
 #include "harness/report/run_data.h"
-#include "harness/report/run_figures.h"
-#include "harness/report/tex_table.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/report/report_run.h"

@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <random>
 
-#include "controller/control/actuation.h"
 #include "controller/dynamics/tree_factor.h"
+#include "controller/model/platform.h"
 #include "harness/checks/check_table.h"
 #include "tests/common/matchers.h"
 #include "tests/harness/run/shipped_run.h"
