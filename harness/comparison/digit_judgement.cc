@@ -68,11 +68,9 @@ class MovedFile {
         double& open = constants_[KeyOf(finding, nominal_[side_].spec)];
         open = Worst(open, std::abs(finding.model - finding.engine));
       }
-      BodyDifferences there = ComparePlaced(moved);
-      for (const auto& [key, difference] : placed) there[key] -= difference;
-      for (const auto& [key, change] : there) placed_[key] = Worst(placed_[key], std::abs(change));
+      RaisePlaced(moved, placed);
     }
-    if (own.undiagonalized) TakeDiagonalisation(*own.undiagonalized);
+    if (own.undiagonalized) TakeDiagonalisation(*own.undiagonalized, placed);
   }
 
   [[nodiscard]] const TermComparison::Spread& spread() const { return spread_; }
@@ -96,6 +94,13 @@ class MovedFile {
     return differences;
   }
 
+  /// Raises the changes that bodies have in the links' frames to those of a draw.
+  void RaisePlaced(const Sides& moved, const BodyDifferences& placed) {
+    BodyDifferences there = ComparePlaced(moved);
+    for (const auto& [key, difference] : placed) there[key] -= difference;
+    for (const auto& [key, change] : there) placed_[key] = Worst(placed_[key], std::abs(change));
+  }
+
   /// Both files' descriptions brought to the same statements, one of them with its numbers moved.
   [[nodiscard]] Sides Complete(const RobotDescription& own) const {
     Sides sides = side_ == 0 ? Sides{own, other_} : Sides{other_, own};
@@ -104,7 +109,7 @@ class MovedFile {
   }
 
   /// The engine's diagonalised tensor is as good as the file's. A larger change is no rounding.
-  void TakeDiagonalisation(const RobotDescription& stated) {
+  void TakeDiagonalisation(const RobotDescription& stated, const BodyDifferences& placed) {
     const Sides sides = Complete(stated);
     const ConstantChecks bodies = CompareBodies(nominal_[side_], sides[side_]);
     const bool is_small = std::ranges::all_of(
@@ -113,6 +118,7 @@ class MovedFile {
     spread_.others.push_back(MakeCopy(sides));
     for (const ConstantFinding& finding : bodies.findings)
       constants_[KeyOf(finding, nominal_[side_].spec)] += std::abs(finding.model - finding.engine);
+    RaisePlaced(sides, placed);
   }
 
   TermComparison::Copy MakeCopy(const Sides& sides) {

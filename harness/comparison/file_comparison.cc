@@ -202,6 +202,19 @@ void CompareTwo(const DescriptionFile& first, const DescriptionFile& second, con
                                      options.part, &comparison->result);
 }
 
+/// Gives joints the limits of `actuatorfrcrange`, a word of later engines, where motors state none, or where
+/// both files have them.
+void LimitEfforts(const DescriptionFile& file, const DescriptionFile& other, PrintedRobot* robot) {
+  constexpr double kDigits = 1e-7;
+  for (PrintedLink& link : robot->links) {
+    std::optional<PrintedScalar>& effort = link.joint.scalars[static_cast<size_t>(JointScalar::kEffort)];
+    const auto range = file.force_ranges().find(link.joint.name);
+    const bool counts = !effort || other.force_ranges().contains(link.joint.name);
+    if (range != file.force_ranges().end() && counts && !(effort && effort->value < range->second))
+      effort = PrintedScalar{range->second, kDigits * range->second};
+  }
+}
+
 /// The causes of the differences between two mechanisms.
 std::optional<FileCauses> TryToExplain(const DescriptionFile& a, const DescriptionFile& b,
                                        const ConsistencyOptions& options, Comparison* comparison) {
@@ -212,6 +225,8 @@ std::optional<FileCauses> TryToExplain(const DescriptionFile& a, const Descripti
     return std::nullopt;
   PrintedRobot first = ReadPrintedRobot(a);
   PrintedRobot second = ReadPrintedRobot(b);
+  LimitEfforts(a, b, &first);
+  LimitEfforts(b, a, &second);
   LeaveOutUnstated(options.ignore, &first);
   LeaveOutUnstated(options.ignore, &second);
   const bool are_urdfs = first.format == RobotFormat::kUrdf && second.format == RobotFormat::kUrdf;

@@ -356,27 +356,12 @@ PrintedRobot PrintDescription(const RobotDescription& description) {
   return robot;
 }
 
-namespace {
-
-/// Gives joints of motors without a limit their `actuatorfrcrange`, a word of later engines.
-void LimitEfforts(const std::map<std::string, double>& force_ranges, PrintedRobot* robot) {
-  for (PrintedLink& link : robot->links) {
-    std::optional<PrintedScalar>& effort = link.joint.scalars[static_cast<size_t>(JointScalar::kEffort)];
-    const auto range = force_ranges.find(link.joint.name);
-    if (range != force_ranges.end() && !(effort && effort->value < range->second))
-      effort = PrintShortest(range->second);
-  }
-}
-
-}  // namespace
-
 PrintedRobot ReadPrintedRobot(const DescriptionFile& file, const DescriptionFile* carrier) {
   PrintedRobot robot;
   if (file.format() == RobotFormat::kUrdf) {
     robot = ReadPrintedUrdf(file.text(), file.path().string());
   } else if (file.format() == RobotFormat::kMjcf) {
     robot = ReadPrintedMjcf(file.document(), *file.CopyEngine());
-    LimitEfforts(file.force_ranges(), &robot);
     for (const std::string& force : file.newer_forces())
       robot.constraints.push_back(fmt::format("{} {}", kServo, force));
     std::ranges::sort(robot.constraints);

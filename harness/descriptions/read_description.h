@@ -63,7 +63,7 @@ class DescriptionFile {
   /// The largest force that joints of an MJCF allow (actuatorfrcrange), by name, N or N m. Engines before 3.0
   /// do not know it.
   [[nodiscard]] const std::map<std::string, double>& force_ranges() const { return force_ranges_; }
-  /// What it says of actuators' forces in words that this engine does not know (ListNewerForces).
+  /// Settings of actuators' forces in words that this engine does not know (ListNewerForces).
   [[nodiscard]] const std::vector<std::string>& newer_forces() const { return newer_forces_; }
   /// A copy of the engine's model.
   [[nodiscard]] MjModelPtr CopyEngine() const;

@@ -125,7 +125,9 @@ std::string Explanation::Describe() const {
   // A rival that is much less likely is of no interest to a reader.
   constexpr double kMostDigits = 3.0;
   const double digits = log_odds / std::log(10.0);
-  if (rival.empty() || digits > kMostDigits) return text;
+  const bool is_listed = std::ranges::any_of(
+      faults, [&](const Fault& fault) { return fault.place + ": " + fault.fault == rival; });
+  if (rival.empty() || is_listed || digits > kMostDigits) return text;
   return text + "; " + FormatNumber(std::pow(10.0, std::round(digits))) + " times less likely: " + rival;
 }
 

@@ -13,7 +13,6 @@
 #include "harness/base/files.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/mjcf_passes.h"
-#include "harness/engine/newer_words.h"
 #include "harness/engine/robot_tree.h"
 #include "harness/engine/xml.h"
 
@@ -89,35 +88,6 @@ std::map<std::string, double> FindForceRanges(const MjcfFile& mjcf) {
     ReadForceRanges(*world, "", DefaultClasses(root), &limits);
   std::erase_if(limits, [](const auto& limit) { return !(limit.second > 0.0); });
   return limits;
-}
-
-std::vector<std::string> ListNewerForces(const MjcfFile& mjcf) {
-  const XMLElement* const root = mjcf.root();
-  const DefaultClasses classes(root);
-  std::vector<std::string> attributes;
-  for (const NewerWord& word : kNewerWords) {
-    if (word.elements != "*" || word.effect != MjcfEffect::kActuators) continue;
-    std::istringstream names{std::string(word.attributes)};
-    for (std::string name; names >> name;) attributes.push_back(name);
-  }
-  std::vector<std::string> forces;
-  for (const XMLElement* section : ListChildren(root, "actuator")) {
-    for (const XMLElement* actuator : ListChildren(section)) {
-      std::string place = "actuator " + ReadAttribute(*actuator, "name");
-      for (const char* kind : {"joint", "jointinparent", "tendon"}) {
-        const std::string name = ReadAttribute(*actuator, kind);
-        if (!name.empty()) place = kind + (" " + name);
-      }
-      for (const std::string& attribute : attributes) {
-        const char* const value = classes.Find(*actuator, "", attribute.c_str());
-        const std::string_view text = value == nullptr ? "" : value;
-        if (text.empty() || text == "false" || text.find_first_of("123456789") == std::string_view::npos)
-          continue;
-        forces.push_back(fmt::format("{}: {} {}", place, attribute, text));
-      }
-    }
-  }
-  return forces;
 }
 
 void AddMotors(MjcfFile* mjcf, const std::map<std::string, double>& limits) {

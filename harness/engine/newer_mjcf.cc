@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
@@ -120,14 +121,16 @@ const NewerWord* FindNewerWord(std::string_view element, std::string_view attrib
 
 bool IsZero(std::string_view text) { return text.find_first_of("123456789") == std::string_view::npos; }
 
+const SchemaElement& ReadSchema() {
+  static const Schema schema;
+  return schema.root();
+}
+
 class Downgrade {
  public:
   explicit Downgrade(MjcfFile* mjcf) : mjcf_(*mjcf) {}
 
-  void Run() {
-    static const Schema schema;
-    Check(mjcf_.root(), schema.root());
-  }
+  void Run() { Check(mjcf_.root(), ReadSchema()); }
 
  private:
   [[noreturn]] void Refuse(const XMLElement& element, const std::string& word, const NewerWord* known) const {
@@ -289,6 +292,38 @@ class Downgrade {
 };
 
 }  // namespace
+
+std::vector<std::string> ListNewerForces(const MjcfFile& mjcf) {
+  const SchemaElement& known = *ReadSchema().children.at("actuator");
+  const XMLElement* const root = mjcf.root();
+  const DefaultClasses classes(root);
+  std::vector<std::string> attributes;
+  for (const NewerWord& word : kNewerWords) {
+    if (word.elements != "*" || word.effect != MjcfEffect::kActuators) continue;
+    std::istringstream names{std::string(word.attributes)};
+    for (std::string name; names >> name;) attributes.push_back(name);
+  }
+  std::vector<std::string> forces;
+  for (const XMLElement* section : ListChildren(root, "actuator")) {
+    for (const XMLElement* actuator : ListChildren(section)) {
+      const auto kind_of = known.children.find(actuator->Name());
+      if (kind_of == known.children.end()) continue;
+      std::string place = "actuator " + ReadAttribute(*actuator, "name");
+      for (const char* kind : {"joint", "jointinparent", "tendon"}) {
+        const std::string name = ReadAttribute(*actuator, kind);
+        if (!name.empty()) place = kind + (" " + name);
+      }
+      for (const std::string& attribute : attributes) {
+        if (kind_of->second->attributes.contains(attribute)) continue;
+        const char* const value = classes.Find(*actuator, "", attribute.c_str());
+        const std::string_view text = value == nullptr ? "" : value;
+        if (text.empty() || (IsZero(text) && text != "true")) continue;
+        forces.push_back(fmt::format("{}: {} {}", place, attribute, text));
+      }
+    }
+  }
+  return forces;
+}
 
 void LeaveOutNewerWords(MjcfFile* mjcf) { Downgrade(mjcf).Run(); }
 

@@ -23,6 +23,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr double kNoError = 1e-14;  // rad or m, which no gain makes a torque of
+
 /// Converts the object's tracking statistics.
 Json TrackingToJson(const TrackingStatistics& tracking) {
   return {{"position_error_max_m", tracking.position.max},
@@ -197,6 +199,10 @@ Json MakeSummary(const Setup& setup, const ClosedLoop& loop, const RunResult& re
   if (scenario.joint_task() != nullptr) {
     json["tracking"] = {{"joint_error_max_rad", result.tracking.joints.max},
                         {"joint_error_rms_rad", result.tracking.joints.rms()}};
+    for (Eigen::Index i = 0; i < result.tracking.of_joints.size() && scenario.controller.exists(); ++i) {
+      if (result.tracking.of_joints[i] <= kNoError)
+        json["tracking"]["joints_without_error"].push_back(setup.model().joint(static_cast<int>(i)).name);
+    }
   } else {
     json["tracking"] = TrackingToJson(result.tracking);
   }
@@ -276,6 +282,11 @@ Answer MakeRunAnswer(const Json& summary, std::span<const CheckRecord> checks) {
     answer.word = "PASS";
     answer.sentence =
         DescribeWhatHolds(checks) + (is_ideal ? "." : ", the scenario's imperfections counted in.");
+    const Json::json_pointer idle("/tracking/joints_without_error");
+    if (summary.contains(idle))
+      answer.remarks.push_back("not tested: gains of " +
+                               JoinNames(summary[idle].get<std::vector<std::string>>()) +
+                               ", whose error stayed 0");
   }
   if (cause.empty() || cause == "none") return answer;
   if (summary.contains("causes")) AddCauses(summary["causes"], &answer);

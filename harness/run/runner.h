@@ -44,6 +44,7 @@ struct TrackingStatistics {
   ErrorStatistics position;     ///< Of the object, m.
   ErrorStatistics orientation;  ///< rad.
   ErrorStatistics joints;       ///< Of the joint that is farthest off, rad or m.
+  VectorXd of_joints;           ///< Largest of each joint that follows a motion, rad or m.
 
   void Add(const TrackingError& error);
 };
@@ -114,6 +115,12 @@ class Runner {
         /*settling=*/true);
     loop_.SetObserver([&](const StepRecord& step) {
       if (step.command.tracks || step.command.joints.q.size() > 0) result_.tracking.Add(step.error);
+      const VectorXd& q_d = step.command.joints.q;
+      if (q_d.size() > 0 && result_.tracking.of_joints.size() != q_d.size())
+        result_.tracking.of_joints = VectorXd::Zero(q_d.size());
+      if (q_d.size() > 0)
+        result_.tracking.of_joints =
+            result_.tracking.of_joints.cwiseMax((q_d - step.reading.state.q.tail(q_d.size())).cwiseAbs());
       if (step.drive.effort > result_.peak_effort) {
         result_.peak_effort = step.drive.effort;
         result_.busiest_motor = loop_.motors()[static_cast<size_t>(step.drive.busiest_motor)].name;

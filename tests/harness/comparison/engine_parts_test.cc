@@ -145,7 +145,7 @@ TEST_F(TwoMjcfs, CompareTheGainsOfAServo) {
   const std::string a = ReplaceOnce(kArm, kEnd, text);
   EXPECT_EQ(
       List(Compare(a, ReplaceOnce(a, "kp='50'", "kp='60'"))),
-      "1. robot: motor differs: p (kp 50, kv 0) here, (kp 60, kv 0) in the other file; explains 100 %\n");
+      "1. robot: motor differs: p (kp 50) here, (kp 60) in the other file; explains 100 %\n");
 }
 
 // No term depends on the order of controls, nor on a body without mass; but what uses them does.
