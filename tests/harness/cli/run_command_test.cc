@@ -191,6 +191,22 @@ TEST_F(RunCommand, AReplayDistinguishesAnotherMachineFromAnotherRun) {
   }
 }
 
+// The geometry of a wrong model is named as the comparison of the two files names it, and no force beside it.
+TEST_F(RunCommand, AModelOfAnotherGeometryIsNamed) {
+  for (const auto& [scenario, change, cause] :
+       {std::tuple("panda-reach", "model.chain.0.rows.4.d=0.394",
+                   "joint panda_joint5: origin differs: d 0.394 in the model, 0.384 in the MJCF"),
+        {"hold", "model.lengths.L_3=0.3801",
+         "joint r_shoulder_pitch, joint l_shoulder_pitch: origin differs: a 0.3801 in the model, "
+         "0.38 in the MJCF"}}) {
+    SCOPED_TRACE(scenario);
+    const Json causes =
+        RunJson(1, {"run", scenario, "--set", change, "--set", "duration=0.02", "--no-log"}).at("causes");
+    ASSERT_EQ(causes.size(), 1U) << causes;
+    EXPECT_EQ(causes[0].at("text"), std::string(cause));
+  }
+}
+
 TEST_F(RunCommand, DisagreementIsExitCodeOneAndNamesTheCause) {
   const Json summary = RunJson(1, "run paper-rest --set duration=0.3 --no-log");
   EXPECT_EQ(summary["verdict"], "disagreement");

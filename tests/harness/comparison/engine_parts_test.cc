@@ -143,9 +143,39 @@ TEST_F(TwoMjcfs, CompareWhichJointAServoMoves) {
 TEST_F(TwoMjcfs, CompareTheGainsOfAServo) {
   const std::string text = "<actuator><position name='p' joint='elbow' kp='50'/></actuator></mujoco>";
   const std::string a = ReplaceOnce(kArm, kEnd, text);
+  EXPECT_EQ(List(Compare(a, ReplaceOnce(a, "kp='50'", "kp='60'"))),
+            "1. robot: motor differs: p (kp 50) here, (kp 60) in the other file; explains 100 %\n");
+}
+
+// What this engine does not know of a servo is compared as it is written.
+TEST_F(TwoMjcfs, CompareNewerWordsOfServos) {
+  const std::string text = "<actuator><position name='p' joint='elbow' kp='50' kv='5'/></actuator></mujoco>";
+  const std::string a = ReplaceOnce(kArm, kEnd, text);
+  EXPECT_TRUE(Compare(a, a).Agrees());
   EXPECT_EQ(
-      List(Compare(a, ReplaceOnce(a, "kp='50'", "kp='60'"))),
-      "1. robot: motor differs: p (kp 50) here, (kp 60) in the other file; explains 100 %\n");
+      List(Compare(a, ReplaceOnce(a, "kv='5'", "kv='6'"))),
+      "1. robot: constraint differs: servo at joint elbow: kv 5 here, servo at joint elbow: kv 6 in the "
+      "other file; explains 100 %\n");
+  EXPECT_EQ(List(Compare(a, ReplaceOnce(a, " kv='5'", ""))),
+            "1. robot: constraint not in the other file: servo at joint elbow: kv 5; explains 100 %\n");
+  // Its name is no part of it.
+  EXPECT_TRUE(Compare(a, ReplaceOnce(a, "name='p'", "name='q'")).Agrees());
+}
+
+// Where both files leave bodies to the engine, their shapes differ, and none lacks an inertial.
+TEST_F(TwoMjcfs, CompareBodiesThatAreComputedFromShapes) {
+  EXPECT_EQ(
+      List(Compare(kArm, ReplaceOnce(kArm, "size=\"0.025\"", "size=\"0.025\" density=\"500\""))),
+      "1. link fore: inertial from shapes of another size, place or density, or with settotalmass: all of "
+      "it 2 times the other file's; explains 100 %\n");
+  EXPECT_THAT(List(Compare(kArm, ReplaceOnce(kArm, "size=\"0.025\"", "size=\"0.02\""))),
+              HasSubstr("1. link fore: inertial from shapes of another size, place or density"));
+}
+
+TEST_F(TwoMjcfs, NameAJointsReference) {
+  const std::string b = ReplaceOnce(kArm, "name=\"elbow\"", "name=\"elbow\" ref=\"1.5\"");
+  EXPECT_THAT(List(Compare(kArm, b)),
+              HasSubstr("joint elbow: rotation with another zero of the joint: ref 0 here, 1.5 in"));
 }
 
 // No term depends on the order of controls, nor on a body without mass; but what uses them does.

@@ -232,7 +232,7 @@ class Rows : public ::testing::Test {
  protected:
   Rows()
       : right_(ReadPrintedRobot(DescriptionFile(SourcePath("/controller/parameters/panda.toml")))),
-        mjcf_(ReadPrintedRobot(DescriptionFile(SourcePath("/mjcf/panda.xml")))) {}
+        mjcf_(ReadPrintedRobot(DescriptionFile(SourcePath("/mjcf/robot.xml")))) {}
 
   template <typename Change>
   [[nodiscard]] std::vector<std::string> Find(const Change& change) const {
@@ -313,6 +313,21 @@ TEST_F(Rows, InDegreesOrMillimetresAreNamed) {
   const auto ids = Find([](int i, PrintedRobot* robot) { robot->link(i).origin.r *= 180.0 / kPi; });
   EXPECT_THAT(ids, ElementsAre("rotation.degrees"));
   EXPECT_EQ(Find([](int i, PrintedRobot* robot) { robot->link(i).origin.r[0] *= -1.0; }).size(), 1U);
+}
+
+TEST(Lengths, OfAWholeFileInAnotherUnitAreOneCause) {
+  const PrintedRobot right = ReadPrintedRobot(DescriptionFile(SourcePath("/mjcf/robot.xml")));
+  PrintedRobot wrong = right;
+  for (PrintedLink& link : wrong.links) {
+    link.origin.t *= 1e3;
+    link.origin.half_t *= 1e3;
+    link.joint.anchor *= 1e3;
+    if (!link.inertial) continue;
+    link.inertial->origin.t *= 1e3;
+    link.inertial->origin.half_t *= 1e3;
+  }
+  EXPECT_THAT(ListIds(FindCorrections(wrong, right)), ElementsAre("lengths.mm"));
+  EXPECT_THAT(ListIds(FindCorrections(right, wrong)), ElementsAre("lengths.per_1000"));
 }
 
 // The fault is in the second file: the first is right, and no patch makes it wrong.
