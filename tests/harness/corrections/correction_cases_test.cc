@@ -232,7 +232,7 @@ class Rows : public ::testing::Test {
  protected:
   Rows()
       : right_(ReadPrintedRobot(DescriptionFile(SourcePath("/controller/parameters/panda.toml")))),
-        mjcf_(ReadPrintedRobot(DescriptionFile(SourcePath("/mjcf/robot.xml")))) {}
+        mjcf_(ReadPrintedRobot(DescriptionFile(SourcePath("/mjcf/panda.xml")))) {}
 
   template <typename Change>
   [[nodiscard]] std::vector<std::string> Find(const Change& change) const {
