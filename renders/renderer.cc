@@ -257,7 +257,8 @@ Renderer::Renderer(const mjModel& model, const RenderOptions& options)
                  static_cast<size_t>(options.samples * options.height));
 }
 
-Renderer::~Renderer() {
+// A context that was current once is made so again.
+Renderer::~Renderer() {  // NOLINT(bugprone-exception-escape)
   gl_->MakeCurrent();
   LoadMesa().glDeleteLists(cone_, 1);
   mjr_freeContext(&context_);

@@ -110,7 +110,7 @@ class Renderer {
   /// @throws InputError when the model has no such camera (the message lists those that exist) or body.
   /// @throws std::invalid_argument for sizes that cannot be drawn.
   Renderer(const mjModel& model, const RenderOptions& options);
-  ~Renderer();
+  ~Renderer();  // NOLINT(bugprone-exception-escape)
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 

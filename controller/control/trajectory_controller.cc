@@ -97,7 +97,7 @@ ContactFollower::Velocities ContactFollower::CalcVelocities(const MeasuredState&
     now.V_Bo.head<3>() += timing_.velocity_age * omega.cross(v);
     return now;
   }
-  const Velocities middle{0.5 * (last_[finger].V_f + now.V_f), 0.5 * (last_[finger].V_Bo + now.V_Bo)};
+  Velocities middle{0.5 * (last_[finger].V_f + now.V_f), 0.5 * (last_[finger].V_Bo + now.V_Bo)};
   last_[finger] = now;
   return middle;
 }
