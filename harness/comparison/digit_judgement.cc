@@ -235,9 +235,10 @@ class DigitJudge {
   [[nodiscard]] double FindOpen(const ConstantFinding& finding, bool is_placed = false) const {
     const ConstantKey key = KeyOf(finding, model_.spec());
     const double open = a_.FindOpen(key, is_placed) + b_.FindOpen(key, is_placed);
-    return open > 0.0 || !are_mjcfs_ ? open : FindHalf(finding.model) + FindHalf(finding.engine);
+    const bool is_of_motor = are_mjcfs_ && finding.check.starts_with("motor_");
+    return is_of_motor ? FindHalf(finding.model) + FindHalf(finding.engine) : open;
   }
-  /// Half a unit of the last digit of a number that no draw moves, such as a motor's: of at least so many.
+  /// Half a unit of the last digit of a motor's number, which no draw moves, if it has at least kFewest.
   static double FindHalf(double value) {
     constexpr int kFewest = 5;
     const std::optional<PrintedNumber> printed = ReadPrinted(FormatNumber(value, 12));

@@ -94,8 +94,7 @@ void CandidateSearch::SearchPlace(int link) {
 
 std::pair<double, std::string> CandidateSearch::CompareReferences(const Origin& origin) const {
   const int partner = pair_.Partner(origin.node);
-  const bool are_mjcfs = pair_.a().format == RobotFormat::kMjcf && pair_.b().format == RobotFormat::kMjcf;
-  if (!origin.is_last || partner < 0 || !are_mjcfs) return {};
+  if (!origin.is_last || partner < 0 || !pair_.AreMjcfs()) return {};
   const double ours = pair_.a().link(origin.node).joint.ref, theirs = pair_.b().link(partner).joint.ref;
   return {theirs - ours, DescribeRight(fmt::format("ref {:.6g}", ours), fmt::format("{:.6g}", theirs))};
 }

@@ -255,8 +255,6 @@ void PrintedPair::ListJointSites(int link, std::vector<Site>* sites) const {
                               given_[static_cast<size_t>(link)].pose.length.norm()))
       add(SiteKind::kAxisPoint);
   }
-  // An MJCF's joint without limits has none; other files need not state them.
-  const bool are_mjcfs = a_.format == RobotFormat::kMjcf && b_.format == RobotFormat::kMjcf;
   const auto limits = [](const PrintedRobot& robot) {
     return std::ranges::any_of(robot.links, [](const PrintedLink& l) { return l.joint.range.has_value(); });
   };
@@ -264,7 +262,7 @@ void PrintedPair::ListJointSites(int link, std::vector<Site>* sites) const {
     if (Differ((*ours.range)[0], (*theirs.range)[0]) || Differ((*ours.range)[1], (*theirs.range)[1]))
       add(SiteKind::kRange);
   } else if (ours.range.has_value() != theirs.range.has_value() &&
-             (are_mjcfs || (limits(a_) && limits(b_)))) {
+             (AreMjcfs() || (limits(a_) && limits(b_)))) {
     add(SiteKind::kRange);
   }
   ListConstantSites(link, sites);
@@ -323,8 +321,8 @@ void PrintedPair::ListRobotSites(std::vector<Site>* sites) const {
   if (a_.gravity && b_.gravity && (*a_.gravity - *b_.gravity).cwiseAbs().maxCoeff() > 1e-9)
     sites->push_back({SiteKind::kGravity, 0});
   // Free joints of two MJCFs are compared as those of links.
-  const bool is_link = a_.format == RobotFormat::kMjcf && b_.format == RobotFormat::kMjcf;
-  if (a_.floats && b_.floats && *a_.floats != *b_.floats && !is_link) sites->push_back({SiteKind::kType, 0});
+  if (a_.floats && b_.floats && *a_.floats != *b_.floats && !AreMjcfs())
+    sites->push_back({SiteKind::kType, 0});
   if (a_.constraints != b_.constraints) sites->push_back({SiteKind::kConstraint, 0});
   const auto is_other = [&](const PrintedMotor& motor) { return FindRight(motor) != motor; };
   if (std::ranges::any_of(a_.motors, is_other)) sites->push_back({SiteKind::kMotor, 0});

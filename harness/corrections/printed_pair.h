@@ -36,6 +36,10 @@ class PrintedPair {
   [[nodiscard]] PrintedRobot* mutable_a() { return &a_; }
   [[nodiscard]] PrintedRobot* mutable_b() { return &b_; }
   [[nodiscard]] const PrintedRobot& b() const { return b_; }
+  /// Whether both files are MJCFs, which state a joint's limits and reference, or have none.
+  [[nodiscard]] bool AreMjcfs() const {
+    return a_.format == RobotFormat::kMjcf && b_.format == RobotFormat::kMjcf;
+  }
   [[nodiscard]] const LinkMatch& match() const { return match_; }
   [[nodiscard]] const Node& node(int link) const { return nodes_[static_cast<size_t>(link)]; }
   [[nodiscard]] const Node& node_b(int link) const { return nodes_b_[static_cast<size_t>(link)]; }

@@ -147,7 +147,7 @@ TEST_F(TwoMjcfs, CompareTheGainsOfAServo) {
             "1. robot: motor differs: p (kp 50) here, (kp 60) in the other file; explains 100 %\n");
 }
 
-// What this engine does not know of a servo is compared as it is written.
+// Words that this engine does not know are compared as they are written.
 TEST_F(TwoMjcfs, CompareNewerWordsOfServos) {
   const std::string text = "<actuator><position name='p' joint='elbow' kp='50' kv='5'/></actuator></mujoco>";
   const std::string a = ReplaceOnce(kArm, kEnd, text);
@@ -162,7 +162,7 @@ TEST_F(TwoMjcfs, CompareNewerWordsOfServos) {
   EXPECT_TRUE(Compare(a, ReplaceOnce(a, "name='p'", "name='q'")).Agrees());
 }
 
-// Where both files leave bodies to the engine, their shapes differ, and none lacks an inertial.
+// Bodies that both files leave to the engine differ in their shapes: none lacks an inertial.
 TEST_F(TwoMjcfs, CompareBodiesThatAreComputedFromShapes) {
   EXPECT_EQ(
       List(Compare(kArm, ReplaceOnce(kArm, "size=\"0.025\"", "size=\"0.025\" density=\"500\""))),
