@@ -17,6 +17,7 @@
 #include "harness/comparison/engine_contacts.h"
 #include "harness/comparison/engine_parts.h"
 #include "harness/corrections/read_printed.h"
+#include "harness/descriptions/alike_names.h"
 #include "harness/descriptions/compiled_inertias.h"
 #include "harness/descriptions/engine_provider.h"
 #include "harness/descriptions/mjcf_reader.h"
@@ -123,13 +124,22 @@ void CompareBesideEngine(const std::array<const DescriptionFile*, 2>& files,
 }
 
 /// Lists the parts that the first of two MJCFs has besides its mechanism, notes what else the two have, and
-/// takes parts that both have out of the second one.
-std::vector<EnginePart> ListFirstParts(const DescriptionFile& first, mjModel* engine, EngineParts* parts,
-                                       Comparison* comparison) {
+/// takes parts that both have out of the second one. @param names of the first file's joints in the second.
+std::vector<EnginePart> ListFirstParts(const DescriptionFile& first, const std::vector<std::string>& names,
+                                       mjModel* engine, EngineParts* parts, Comparison* comparison) {
   const MjModelPtr own_engine = first.CopyEngine();
-  const RobotModel model(first.Describe().spec);
+  const RobotDescription described = first.Describe();
+  const RobotModel model(described.spec);
   EngineParts own = ListEngineParts(Adapter(model, *own_engine, first.path().string()), {false, true});
   const std::string file = first.path().filename(), other = comparison->second.filename();
+  const std::vector<std::string> own_names = ListJointNames(described);
+  for (EnginePart& part : own.parts) {
+    for (std::string& target : part.acts_on) {
+      const auto at = static_cast<size_t>(std::ranges::find(own_names, target) - own_names.begin());
+      if (part.kind == PartKind::kActuator && at < own_names.size() && own_names.size() == names.size())
+        target = names[at];
+    }
+  }
   MatchMotors(own.parts, &parts->parts);
   comparison->without_effect = CompareOptions(own_engine->opt, engine->opt, file, other);
   Append(CompareContacts(own.notes, parts->notes), &comparison->without_effect);
@@ -152,7 +162,8 @@ ConstantChecks CompareEngineConstants(const DescriptionFile& first, const FilePa
                                        "gears): " +
                                        JoinNames(parts.motors));
   FirstFile stated{true, pair.second ? &pair.first : nullptr, options.ignore, file};
-  if (first.format() == RobotFormat::kMjcf) stated.parts = ListFirstParts(first, engine, &parts, comparison);
+  if (first.format() == RobotFormat::kMjcf)
+    stated.parts = ListFirstParts(first, ListJointNames(pair.first), engine, &parts, comparison);
   ConstantChecks constants = CheckConstants(adapter, parts, stated);
   Append(constants.not_compared, &comparison->not_compared);
   return constants;

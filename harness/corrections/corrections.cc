@@ -18,43 +18,6 @@
 namespace dexcheck {
 namespace {
 
-/// Gives `link` what `right` has otherwise than `before`.
-void Merge(PrintedLink before, PrintedLink right, PrintedLink* link) {
-  const auto take = [](const auto& from, const auto& to, auto* member) {
-    if (!(from == to)) *member = to;
-  };
-  const auto merge = [](auto* from, auto* to, auto* merged) {
-    const std::vector<LinkNumber> given = ListNumbers(from), made = ListNumbers(to), at = ListNumbers(merged);
-    for (size_t k = 0; k < at.size(); ++k) {
-      if (*given[k].value == *made[k].value) continue;
-      *at[k].value = *made[k].value;
-      *at[k].half = *made[k].half;
-    }
-  };
-  const auto merge_origin = [&](PrintedOrigin* from, PrintedOrigin* to, PrintedOrigin* merged) {
-    merge(from, to, merged);
-    if (!IsTurned(*from, *to)) return;
-    PrintedOrigin turned = *to;
-    turned.TakePlace(*merged);
-    *merged = turned;
-  };
-  merge_origin(&before.origin, &right.origin, &link->origin);
-  if (!before.inertial || !right.inertial || !link->inertial) {
-    if (before.inertial.has_value() != right.inertial.has_value()) link->inertial = right.inertial;
-  } else {
-    merge(&*before.inertial, &*right.inertial, &*link->inertial);
-    merge_origin(&before.inertial->origin, &right.inertial->origin, &link->inertial->origin);
-  }
-  if (before.joint.kind != right.joint.kind) link->joint = right.joint;
-  take(before.joint.name, right.joint.name, &link->joint.name);
-  take(before.joint.axis, right.joint.axis, &link->joint.axis);
-  take(before.joint.anchor, right.joint.anchor, &link->joint.anchor);
-  take(before.joint.range, right.joint.range, &link->joint.range);
-  take(before.joint.mimic, right.joint.mimic, &link->joint.mimic);
-  for (size_t k = 0; k < kNumJointScalars; ++k)
-    take(before.joint.scalars[k], right.joint.scalars[k], &link->joint.scalars[k]);
-}
-
 /// @param in_second the place has the second file's name.
 std::string NamePlace(const PrintedPair& pair, int link, SiteKind kind, bool in_second = false) {
   if (kind >= SiteKind::kGravity) return "robot";
@@ -276,7 +239,7 @@ class OneWay {
              const std::vector<CorrectionCandidate>& candidates) {
     for (const size_t c : deal.candidates) {
       for (const LinkPatch& patch : candidates[c].patches)
-        Merge(before.link(patch.link), patch.right, &pair_.mutable_a()->link(patch.link));
+        TakeChanges(before.link(patch.link), patch.right, &pair_.mutable_a()->link(patch.link));
       // A site without a patch stays as it is; a body that the file had not is none of the measured parts.
       const bool is_measured =
           !candidates[c].patches.empty() && !pair_.node(candidates[c].link).parts.empty();
@@ -434,6 +397,42 @@ void TryReadings(const PrintedRobot& a, const PrintedRobot& b, bool of_second, i
 }
 
 }  // namespace
+
+void TakeChanges(PrintedLink before, PrintedLink right, PrintedLink* link) {
+  const auto take = [](const auto& from, const auto& to, auto* member) {
+    if (!(from == to)) *member = to;
+  };
+  const auto merge = [](auto* from, auto* to, auto* merged) {
+    const std::vector<LinkNumber> given = ListNumbers(from), made = ListNumbers(to), at = ListNumbers(merged);
+    for (size_t k = 0; k < at.size(); ++k) {
+      if (*given[k].value == *made[k].value) continue;
+      *at[k].value = *made[k].value;
+      *at[k].half = *made[k].half;
+    }
+  };
+  const auto merge_origin = [&](PrintedOrigin* from, PrintedOrigin* to, PrintedOrigin* merged) {
+    merge(from, to, merged);
+    if (!IsTurned(*from, *to)) return;
+    PrintedOrigin turned = *to;
+    turned.TakePlace(*merged);
+    *merged = turned;
+  };
+  merge_origin(&before.origin, &right.origin, &link->origin);
+  if (!before.inertial || !right.inertial || !link->inertial) {
+    if (before.inertial.has_value() != right.inertial.has_value()) link->inertial = right.inertial;
+  } else {
+    merge(&*before.inertial, &*right.inertial, &*link->inertial);
+    merge_origin(&before.inertial->origin, &right.inertial->origin, &link->inertial->origin);
+  }
+  if (before.joint.kind != right.joint.kind) link->joint = right.joint;
+  take(before.joint.name, right.joint.name, &link->joint.name);
+  take(before.joint.axis, right.joint.axis, &link->joint.axis);
+  take(before.joint.anchor, right.joint.anchor, &link->joint.anchor);
+  take(before.joint.range, right.joint.range, &link->joint.range);
+  take(before.joint.mimic, right.joint.mimic, &link->joint.mimic);
+  for (size_t k = 0; k < kNumJointScalars; ++k)
+    take(before.joint.scalars[k], right.joint.scalars[k], &link->joint.scalars[k]);
+}
 
 FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b) {
   constexpr double kOneFault = 16.0;

@@ -49,6 +49,9 @@ struct FileCorrections {
 FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b);
 FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b);
 
+/// Gives `link` what `right` has otherwise than `before`.
+void TakeChanges(PrintedLink before, PrintedLink right, PrintedLink* link);
+
 /// One line: "joints q1, q2: rotation with its angles in degrees". @param file that has the fault; may be
 /// empty.
 std::string DescribeItem(const CorrectionItem& item, const std::string& file = "");

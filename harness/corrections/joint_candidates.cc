@@ -210,7 +210,7 @@ void CandidateSearch::SearchMotors(const Site& site) {
   TakeMotors(&moved);
   std::vector<Site> right = {site};
   for (const Site& other : sites_) {
-    if (other.kind == SiteKind::kConstraint && moved.constraints == pair_.b().constraints)
+    if (other.kind == SiteKind::kConstraint && pair_.RenameConstraints(moved) == pair_.b().constraints)
       right.push_back(other);
     if (other.kind != SiteKind::kGear && other.kind != SiteKind::kEffort) continue;
     const JointScalar scalar = other.kind == SiteKind::kGear ? JointScalar::kGear : JointScalar::kEffort;
@@ -249,12 +249,13 @@ void CandidateSearch::SearchRobot() {
       const auto name = [](bool floats) { return std::string(floats ? "floating" : "fixed"); };
       add(Kind::kNumber, 3.0, DescribeRight(name(*a.floats) + " base", name(*b.floats)));
     } else if (site.kind == SiteKind::kConstraint) {
-      const auto list = [](const PrintedRobot& robot, const PrintedRobot& other) {
+      const auto list = [](const std::vector<std::string>& own, const std::vector<std::string>& other) {
         std::vector<std::string> only;
-        std::ranges::set_difference(robot.constraints, other.constraints, std::back_inserter(only));
+        std::ranges::set_difference(own, other, std::back_inserter(only));
         return only;
       };
-      const std::vector<std::string> lacking = list(b, a), surplus = list(a, b);
+      const std::vector<std::string> ours = pair_.RenameConstraints(a);
+      const std::vector<std::string> lacking = list(b.constraints, ours), surplus = list(ours, b.constraints);
       if (!lacking.empty() && !surplus.empty())
         add(Kind::kNumber, 8.0, DescribeRight(JoinNames(surplus), JoinNames(lacking)));
       if (!lacking.empty() && surplus.empty()) add(Kind::kMissing, 3.0, JoinNames(lacking));

@@ -1,7 +1,9 @@
 #include "harness/corrections/printed_pair.h"
 
 #include <algorithm>
+#include <map>
 #include <set>
+#include <string>
 #include <utility>
 
 namespace dexcheck {
@@ -323,9 +325,30 @@ void PrintedPair::ListRobotSites(std::vector<Site>* sites) const {
   // Free joints of two MJCFs are compared as those of links.
   if (a_.floats && b_.floats && *a_.floats != *b_.floats && !AreMjcfs())
     sites->push_back({SiteKind::kType, 0});
-  if (a_.constraints != b_.constraints) sites->push_back({SiteKind::kConstraint, 0});
+  if (RenameConstraints(a_) != b_.constraints) sites->push_back({SiteKind::kConstraint, 0});
   const auto is_other = [&](const PrintedMotor& motor) { return FindRight(motor) != motor; };
   if (std::ranges::any_of(a_.motors, is_other)) sites->push_back({SiteKind::kMotor, 0});
+}
+
+std::vector<std::string> PrintedPair::RenameConstraints(const PrintedRobot& a) const {
+  std::map<std::string, std::string> names;
+  for (const int i : links_) {
+    if (Moves(a.link(i))) names.emplace(a.link(i).joint.name, b_.link(Partner(i)).joint.name);
+    names.emplace(a.link(i).name, b_.link(Partner(i)).name);
+  }
+  std::vector<std::string> renamed;
+  for (const std::string& constraint : a.constraints) {
+    std::string& text = renamed.emplace_back();
+    for (size_t begin = 0; begin < constraint.size();) {
+      const size_t end = std::min(constraint.find_first_of(" :,", begin), constraint.size());
+      const std::string word = constraint.substr(begin, end - begin);
+      const auto other = names.find(word);
+      text += (other == names.end() ? word : other->second) + constraint.substr(end, end < constraint.size());
+      begin = end + 1;
+    }
+  }
+  std::ranges::sort(renamed);
+  return renamed;
 }
 
 std::vector<Site> PrintedPair::ListSites() const {

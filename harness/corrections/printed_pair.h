@@ -77,6 +77,9 @@ class PrintedPair {
   [[nodiscard]] std::vector<Site> ListSites() const;
   /// A motor of the first file with the joint, and the gains of a servo, that it has in the second one.
   [[nodiscard]] PrintedMotor FindRight(PrintedMotor motor) const;
+  /// The constraints of the first file, or of a copy of it, with the second file's names of its joints and
+  /// links.
+  [[nodiscard]] std::vector<std::string> RenameConstraints(const PrintedRobot& a) const;
   /// Whether a file states some number of this kind at any joint.
   [[nodiscard]] static bool States(const PrintedRobot& robot, JointScalar scalar);
 

@@ -21,24 +21,28 @@ namespace {
 
 using XmlElement = tinyxml2::XMLElement;
 
-/// Corrects the first cause, and looks again. @param agrees set to whether nothing is left.
+/// Corrects all causes, and looks again. @param agrees set to whether nothing is left.
 /// @param changes set to whether anything was corrected.
 PrintedRobot RepairRobot(PrintedRobot robot, const PrintedRobot& reference, bool* agrees, bool* changes) {
+  constexpr int kRounds = 10;
+  const auto is_reading = [](const CorrectionItem& one) {
+    return one.fault.kind >= CorrectionKind::kClassicRows;
+  };
   *agrees = *changes = false;
-  for (int round = 0; round < 2 * robot.size(); ++round) {
+  bool goes_on = true;
+  for (int round = 0; goes_on && round < kRounds; ++round) {
     const FileCorrections found = FindCorrections(robot, reference);
     *agrees = found.agrees;
-    if (found.of_second) break;
-    const auto is_reading = [](const CorrectionItem& one) {
-      return one.fault.kind >= CorrectionKind::kClassicRows;
-    };
-    const auto has_patch = [](const CorrectionItem& one) { return !one.patches.empty(); };
     // The patches beside another reading of the file are of the robot that was so read.
-    if (std::ranges::any_of(found.items, is_reading)) break;
-    const auto item = std::ranges::find_if(found.items, has_patch);
-    if (item == found.items.end()) break;
-    *changes = true;
-    for (const LinkPatch& patch : item->patches) robot.link(patch.link) = patch.right;
+    if (found.of_second || std::ranges::any_of(found.items, is_reading)) break;
+    goes_on = false;
+    const PrintedRobot before = robot;
+    for (const CorrectionItem& item : found.items) {
+      for (const LinkPatch& patch : item.patches) {
+        TakeChanges(before.link(patch.link), patch.right, &robot.link(patch.link));
+        *changes = goes_on = true;
+      }
+    }
   }
   return robot;
 }
