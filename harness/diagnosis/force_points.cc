@@ -57,11 +57,11 @@ std::vector<Body> ListBodies(const std::vector<Turns>& turns, std::span<const Ca
 
 /// The body of a force at a point, in the steps in which that acts.
 Body FindBody(const std::vector<Turns>& turns, std::span<const Candidate> candidates,
-              const ForceAtPoint& force) {
+              const std::string& place, const StepRange& within) {
   const std::vector<Body> bodies = ListBodies(turns, candidates);
   Body body = *std::ranges::find(
-      bodies, force.place, [](const Body& one) -> const auto& { return one.force->place; });
-  body.within = force.within;
+      bodies, place, [](const Body& one) -> const auto& { return one.force->place; });
+  body.within = within;
   return body;
 }
 
@@ -76,19 +76,19 @@ Candidate MakeCandidate(const Body& body, const Vector3d& p) {
 
 /// Moves a force and its point to where they explain most of y. @param beside columns of what else there is.
 /// @return none where there is no such point.
-std::optional<ForceAtPoint> Improve(const VectorXd& y, const Body& body, ForceAtPoint force, double reach,
-                                    const MatrixXd& beside) {
+std::optional<Candidate> Improve(const VectorXd& y, const Body& body, Vector3d force, Vector3d point,
+                                 double reach, const MatrixXd& beside) {
   constexpr int kMostIterations = 30;  // of Gauss-Newton
   constexpr double kExact = 1e-10;     // m
   for (int i = 0; i < kMostIterations; ++i) {
     MatrixXd all(y.size(), 6 + beside.cols());
-    all << body.AtPoint(force.point), body.ByPoint(force.force), beside;
+    all << body.AtPoint(point), body.ByPoint(force), beside;
     const VectorXd a = SolveLeastSquares(all, y);
-    force.force = a.head<3>();
-    force.point += a.segment<3>(3);
+    force = a.head<3>();
+    point += a.segment<3>(3);
     if (a.segment<3>(3).norm() < kExact) break;
   }
-  return force.point.norm() < reach ? std::optional(force) : std::nullopt;
+  return point.norm() < reach ? std::optional(MakeCandidate(body, point)) : std::nullopt;
 }
 
 }  // namespace
@@ -126,17 +126,11 @@ void AddForcesAtPoints(const VectorXd& y, const std::vector<Turns>& turns, doubl
         SearchLimit::IsOver())
       break;
     if (force.isZero(0.0)) continue;
-    const ForceAtPoint start{body.force->place, force,
-                             body.turns.front().transpose() * CalcArm(wrenches[index]), body.within};
-    if (const auto found = Improve(y, body, start, reach, MatrixXd(y.size(), 0)))
-      added.push_back(MakeCandidate(body, found->point));
+    const Vector3d start = body.turns.front().transpose() * CalcArm(wrenches[index]);
+    if (auto found = Improve(y, body, force, start, reach, MatrixXd(y.size(), 0)))
+      added.push_back(*std::move(found));
   }
   std::ranges::move(added, std::back_inserter(*candidates));
-}
-
-Candidate MakeForceAtPoint(const ForceAtPoint& force, const std::vector<Turns>& turns,
-                           std::span<const Candidate> candidates) {
-  return MakeCandidate(FindBody(turns, candidates, force), force.point);
 }
 
 std::optional<Candidate> MakeForceOfWrench(const std::string& place, const VectorXd& wrench,
@@ -144,16 +138,16 @@ std::optional<Candidate> MakeForceOfWrench(const std::string& place, const Vecto
                                            const std::vector<Turns>& turns,
                                            std::span<const Candidate> candidates) {
   if (wrench.head<3>().isZero(0.0)) return std::nullopt;
-  const Body body = FindBody(turns, candidates, {place, {}, {}, within});
+  const Body body = FindBody(turns, candidates, place, within);
   const Vector3d point = body.turns[static_cast<size_t>(step)].transpose() * CalcArm(wrench);
   if (!(point.norm() < reach)) return std::nullopt;
   return MakeCandidate(body, point);
 }
 
-std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Turns>& turns, double reach,
-                                        const ForceAtPoint& start, const MatrixXd& beside,
-                                        std::span<const Candidate> candidates) {
-  return Improve(y, FindBody(turns, candidates, start), start, reach, beside);
+std::optional<Candidate> RefinePoint(const VectorXd& y, const std::vector<Turns>& turns, double reach,
+                                     const Candidate& one, const VectorXd& force, const StepRange& within,
+                                     const MatrixXd& beside, std::span<const Candidate> candidates) {
+  return Improve(y, FindBody(turns, candidates, one.place, within), force, one.fitted, reach, beside);
 }
 
 MatrixXd CalcCenterColumns(const std::string& place, const Vector3d& d, double more,

@@ -21,13 +21,6 @@ struct StepRange {
   bool operator==(const StepRange&) const = default;
 };
 
-/// A force (world, N) at a point of a body (its axes, of its centre of mass, m).
-struct ForceAtPoint {
-  std::string place;
-  Vector3d force, point;
-  StepRange within;
-};
-
 /// The candidate of that fault at that place, of which there is one.
 const Candidate& FindCandidate(std::span<const Candidate> candidates, std::string_view fault,
                                std::string_view place);
@@ -41,21 +34,18 @@ Vector3d CalcArm(const Eigen::Ref<const VectorXd>& wrench);
 void AddForcesAtPoints(const VectorXd& y, const std::vector<Turns>& turns, double reach,
                        std::vector<Candidate>* candidates);
 
-/// One of those whose point is known.
-Candidate MakeForceAtPoint(const ForceAtPoint& force, const std::vector<Turns>& turns,
-                           std::span<const Candidate> candidates);
 /// One that has a force and moment (6, world axes) at a step; none where no point of the body has it.
 std::optional<Candidate> MakeForceOfWrench(const std::string& place, const VectorXd& wrench,
                                            const StepRange& within, Eigen::Index step, double reach,
                                            const std::vector<Turns>& turns,
                                            std::span<const Candidate> candidates);
 
-/// Returns the force and its point beside other faults. @param start the first guess. @param beside columns
-/// of the others.
+/// Returns one of those beside other faults. @param one, force (N) the first guess. @param beside columns of
+/// the others.
 /// @returns none where there is no such point.
-std::optional<ForceAtPoint> RefinePoint(const VectorXd& y, const std::vector<Turns>& turns, double reach,
-                                        const ForceAtPoint& start, const MatrixXd& beside,
-                                        std::span<const Candidate> candidates);
+std::optional<Candidate> RefinePoint(const VectorXd& y, const std::vector<Turns>& turns, double reach,
+                                     const Candidate& one, const VectorXd& force, const StepRange& within,
+                                     const MatrixXd& beside, std::span<const Candidate> candidates);
 
 /// Columns of a centre of mass at `place` that is about d (m) off: by d it changes the inertia about the old
 /// one by b(d, d), b(d, e) = m (d^T e 1 - (d e^T + e d^T) / 2), and those of d_k get b(d, e_k).

@@ -353,12 +353,11 @@ bool ForceProblem::RefinePoints(const CauseSelection& selection) {
       beside.conservativeResize(Eigen::NoChange, beside.cols() + columns.cols());
       beside.rightCols(columns.cols()) = columns;
     }
-    const ForceAtPoint start{one.place, term.amplitude, one.fitted, within_[term.candidate]};
-    const auto refined = RefinePoint(y_, turns_, forces_->reach(), start, beside, candidates_);
+    auto refined = RefinePoint(y_, turns_, forces_->reach(), one, term.amplitude, within_[term.candidate],
+                               beside, candidates_);
     if (!refined) continue;
-    const int parameters = one.parameters;
-    one = MakeForceAtPoint(*refined, turns_, candidates_);
-    one.parameters = parameters;
+    refined->parameters = one.parameters;
+    one = *std::move(refined);
     is_refined = true;
   }
   return is_refined;

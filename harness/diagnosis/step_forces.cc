@@ -105,41 +105,23 @@ struct BodyWrench {
 
 }  // namespace
 
-Candidate& StepForces::Next(std::vector<Candidate>* candidates, const char* fault, const std::string& place,
-                            const std::string& unit, double nominal, const VectorXd& scale) {
-  if (next_ == candidates->size()) {
-    candidates->push_back({.fault = fault,
-                           .place = place,
-                           .unit = unit,
-                           .nominal = nominal,
-                           .columns = MatrixXd::Zero(rows() * steps_, scale.size()),
-                           .scale = scale});
+Candidate& StepForces::Next(const char* fault, const std::string& place, const std::string& unit,
+                            double nominal, const VectorXd& scale) {
+  if (next_ == candidates_->size()) {
+    candidates_->push_back({.fault = fault,
+                            .place = place,
+                            .unit = unit,
+                            .nominal = nominal,
+                            .columns = MatrixXd::Zero(rows() * steps_, scale.size()),
+                            .scale = scale});
     // Masses, frictions and the like are not negative.
     constexpr double kRounding = 1e-6;
     if (scale.size() == 1 && std::string_view(fault) != "torque")
-      candidates->back().is_possible = [=](const VectorXd& a) {
+      candidates_->back().is_possible = [=](const VectorXd& a) {
         return a[0] >= -nominal * (1.0 + kRounding);
       };
   }
-  return (*candidates)[next_++];
-}
-
-Candidate& StepForces::AddForceAtPoint(std::vector<Candidate>* candidates, const std::string& place) {
-  Candidate& force = Next(candidates, kForceAtPointInAxes, place, "N", 0.0, Weights(6));
-  // Its moment about the centre of mass is across it.
-  force.is_possible = [this](const VectorXd& a) {
-    constexpr double kAcross = 1e-3;
-    const Vector3d f = a.head<3>(), moment = a.tail<3>();
-    return std::abs(f.dot(moment)) <= kAcross * f.norm() * moment.norm() &&
-           moment.norm() <= reach_ * f.norm();
-  };
-  return force;
-}
-
-VectorXd StepForces::Moved() const {
-  VectorXd scale = Masses(9);
-  scale.head<3>().setOnes();
-  return scale;
+  return (*candidates_)[next_++];
 }
 
 void StepForces::AddRobot(Candidate* candidate, const Eigen::Ref<const MatrixXd>& f) const {
@@ -151,16 +133,22 @@ void StepForces::AddObject(Candidate* candidate, const Matrix6Xd& w) const {
 }
 
 void StepForces::AddColumns(Index begin, Index steps, std::vector<Candidate>* candidates) {
+  candidates_ = candidates;
   begin_ = begin;
   steps_ = steps;
   next_ = 0;
-  AddJoints(candidates);
-  for (int link = first_link_; link < model_.num_joints(); ++link) AddLink(link, candidates);
-  if (store_.setup().has_object()) AddObjectForces(candidates);
-  AddGravity(candidates);
+  AddJoints();
+  const VectorXd nu_dot = Now(StepStore::kMotionAcceleration);
+  for (int index = first_link_; index < model_.num_joints(); ++index) {
+    const Link& link = links_[static_cast<size_t>(index - first_link_)];
+    AddBody("link " + model_.link_name(index), *link.body, link.X.linear(), link.J * terms_.velocity(),
+            link.J * nu_dot + link.J_dot * terms_.velocity(), &link);
+  }
+  if (store_.setup().has_object()) AddObjectForces();
+  AddGravity();
 }
 
-void StepForces::AddJoints(std::vector<Candidate>* candidates) {
+void StepForces::AddJoints() {
   const VectorXd q = Now(StepStore::kMotionPosition);
   const VectorXd rate = Now(StepStore::kMotionVelocity);
   const VectorXd acceleration = Now(StepStore::kMotionAcceleration);
@@ -171,29 +159,29 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
     const std::string force = slides ? "N" : "N m";
     const std::string place = "joint " + model_.dof_name(dof);
     const VectorXd f = VectorXd::Unit(n_, i);
-    AddRobot(&Next(candidates, "torque", place, force, 0.0, Weights(1)), f);
-    AddRobot(&Next(candidates, "armature", place, slides ? "kg" : "kg m^2", joint.armature, Masses(1)),
-             VectorXd(-acceleration[i] * f));
-    AddRobot(&Next(candidates, "viscous friction", place, slides ? "N s/m" : "N m s/rad", joint.damping,
-                   Weights(1)),
-             VectorXd(-rate[i] * f));
+    const auto add = [&](const char* fault, const std::string& unit, double nominal, const VectorXd& scale,
+                         double size) {
+      AddRobot(&Next(fault, place, unit, nominal, scale), VectorXd(size * f));
+    };
+    add("torque", force, 0.0, Weights(1), 1.0);
+    add("armature", slides ? "kg" : "kg m^2", joint.armature, Masses(1), -acceleration[i]);
+    add("viscous friction", slides ? "N s/m" : "N m s/rad", joint.damping, Weights(1), -rate[i]);
     const double sign = rate[i] > 0.0 ? 1.0 : rate[i] < 0.0 ? -1.0 : 0.0;
     if (const Index known_row = FindDryFriction(dof); known_row >= 0) {
       // The plant says it, also for a joint that sticks. The largest value is reported.
       const double known = Now(StepStore::kDryFriction)[known_row];
-      Candidate& bearing = Next(candidates, kBearing, place, force, 0.0, VectorXd::Ones(1));
+      Candidate& bearing = Next(kBearing, place, force, 0.0, VectorXd::Ones(1));
       bearing.nominal = std::max(bearing.nominal, std::abs(known));
       bearing.fitted = VectorXd::Constant(1, joint.dry_friction);
       bearing.parameters = -1;  // its size is known
       AddRobot(&bearing, VectorXd(known * f));
     }
-    AddRobot(&Next(candidates, "dry friction", place, force, joint.dry_friction, Weights(1)),
-             VectorXd(-sign * f));
+    add("dry friction", force, joint.dry_friction, Weights(1), -sign);
     if (joint.type == JointType::kBall) continue;
     MatrixXd spring(n_, 2);
     const double at = q[model_.position_index(model_.joint_of_dof(dof))];
     spring << -at * f, f;
-    Candidate& candidate = Next(candidates, "spring", place, slides ? "N/m" : "N m/rad", 0.0, Weights(2));
+    Candidate& candidate = Next("spring", place, slides ? "N/m" : "N m/rad", 0.0, Weights(2));
     candidate.is_ordinary = true;
     if (candidate.fitted.size() == 0) candidate.fitted = Vector2d(at, at);
     candidate.fitted = Vector2d(std::min(at, candidate.fitted[0]), std::max(at, candidate.fitted[1]));
@@ -208,8 +196,7 @@ void StepForces::AddJoints(std::vector<Candidate>* candidates) {
 }
 
 void StepForces::AddBody(const std::string& place, const MassProperties& body, const Matrix3d& R,
-                         const Vector6d& V, const Vector6d& V_dot, const Link* link,
-                         std::vector<Candidate>* candidates) {
+                         const Vector6d& V, const Vector6d& V_dot, const Link* link) {
   const Matrix3d R_T = R.transpose(), zero = Matrix3d::Zero(), one = Matrix3d::Identity();
   const auto add = [&](Candidate& candidate, const Matrix6Xd& w) {
     if (link == nullptr) return AddObject(&candidate, w);
@@ -218,34 +205,40 @@ void StepForces::AddBody(const std::string& place, const MassProperties& body, c
   const auto push = [&](const char* fault, const char* unit, const Matrix3d& force, const Matrix3d& moment) {
     Matrix6Xd w(6, 3);
     w << force, moment;
-    add(Next(candidates, fault, place, unit, 0.0, Weights(3)), w);
+    add(Next(fault, place, unit, 0.0, Weights(3)), w);
   };
   push(kForce, "N", R_T, zero);
   push(kForceInAxes, "N", one, zero);
   push("moment", "N m", zero, R_T);
   push(kMomentInAxes, "N m", zero, one);
   Matrix6d both = Matrix6d::Identity();
-  add(AddForceAtPoint(candidates, place), both);
+  Candidate& force = Next(kForceAtPointInAxes, place, "N", 0.0, Weights(6));
+  // Its moment about the centre of mass is across it.
+  force.is_possible = [this](const VectorXd& a) {
+    constexpr double kAcross = 1e-3;
+    const Vector3d f = a.head<3>(), m = a.tail<3>();
+    return std::abs(f.dot(m)) <= kAcross * f.norm() * m.norm() && m.norm() <= reach_ * f.norm();
+  };
+  add(force, both);
   both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = R_T;
-  add(Next(candidates, "force and moment", place, "N", 0.0, Weights(6)), both);
+  add(Next("force and moment", place, "N", 0.0, Weights(6)), both);
   if (!(body.mass > 0.0)) return;
   const Vector3d w = V.tail<3>();
   const BodyWrench wrench(V_dot.head<3>() + w.cross(V.head<3>()) - R_T * gravity_, w, V_dot.tail<3>());
-  add(Next(candidates, "mass", place, "kg", body.mass, Masses(1)), -wrench.mass);
+  add(Next("mass", place, "kg", body.mass, Masses(1)), -wrench.mass);
   if (link != nullptr) {
     // The whole body times a factor.
-    const Matrix3d& I = body.inertia;
-    Vector6d entries;
-    entries << I.diagonal(), I(0, 1), I(0, 2), I(1, 2);
-    add(Next(candidates, kMassWithInertia, place, "kg", body.mass, Masses(1)),
-        -wrench.mass - wrench.inertia * entries / body.mass);
+    add(Next(kMassWithInertia, place, "kg", body.mass, Masses(1)),
+        -wrench.mass - wrench.inertia * ToEntries(body.inertia) / body.mass);
   }
-  add(Next(candidates, "inertia", place, "kg m^2", 0.0, Masses(6)), -wrench.inertia);
+  add(Next("inertia", place, "kg m^2", 0.0, Masses(6)), -wrench.inertia);
   // Another centre of mass changes the inertia about the old one.
   Matrix6Xd com(6, 9), payload(6, 10);
   com << -wrench.first_moment * body.mass, -wrench.inertia;
-  add(Next(candidates, kCenterAlone, place, "m", 0.0, VectorXd::Ones(3)), com.leftCols<3>());
-  Candidate& center = Next(candidates, kCenter, place, "m", 0.0, Moved());
+  add(Next(kCenterAlone, place, "m", 0.0, VectorXd::Ones(3)), com.leftCols<3>());
+  VectorXd moved = Masses(9);  // a centre of mass, and the inertia about the old one
+  moved.head<3>().setOnes();
+  Candidate& center = Next(kCenter, place, "m", 0.0, moved);
   // By d it changes the inertia by m (d^T d 1 - d d^T), of which not all of d need show.
   center.is_possible = [m = body.mass, hidden = kHidden * reach_](const VectorXd& a) {
     const double d = a.head<3>().norm() + hidden;
@@ -254,41 +247,34 @@ void StepForces::AddBody(const std::string& place, const MassProperties& body, c
   add(center, com);
   if (link == nullptr) return;
   payload << -wrench.mass, -wrench.first_moment, -wrench.inertia;
-  Candidate& load = Next(candidates, "payload", place, "kg", 0.0, Masses(10));
+  Candidate& load = Next("payload", place, "kg", 0.0, Masses(10));
   // Its mass, place and inertia are worth several faults of one number.
   load.parameters = 3;
   load.is_possible = [reach = reach_](const VectorXd& a) { return a.segment<3>(1).norm() <= reach * a[0]; };
   add(load, payload);
 }
 
-void StepForces::AddLink(int index, std::vector<Candidate>* candidates) {
-  const Link& link = links_[static_cast<size_t>(index - first_link_)];
-  const VectorXd nu_dot = Now(StepStore::kMotionAcceleration);
-  AddBody("link " + model_.link_name(index), *link.body, link.X.linear(), link.J * terms_.velocity(),
-          link.J * nu_dot + link.J_dot * terms_.velocity(), &link, candidates);
-}
-
-void StepForces::AddObjectForces(std::vector<Candidate>* candidates) {
+void StepForces::AddObjectForces() {
   const VectorXd pose = Now(StepStore::kObjectPose);
   const VectorXd motion = Now(StepStore::kObjectMotion);
   const Matrix3d R = pose.head<9>().reshaped(3, 3);
   const ObjectModel& object = store_.setup().declared_object();
   const std::string place = "object " + object.name;
-  AddBody(place, object.body, R, motion.head<6>(), motion.tail<6>(), nullptr, candidates);
+  AddBody(place, object.body, R, motion.head<6>(), motion.tail<6>(), nullptr);
   Vector6d drag = Vector6d::Zero();
   drag.head<3>() = -motion.head<3>();
-  AddObject(&Next(candidates, "drag", place, "N s/m", 0.0, Weights(1)), drag);
+  AddObject(&Next("drag", place, "N s/m", 0.0, Weights(1)), drag);
   Matrix6Xd tether = Matrix6Xd::Zero(6, 4);
   tether.topRows<3>() << -R.transpose() * pose.tail<3>(), R.transpose();
-  AddObject(&Next(candidates, "tether", place, "N/m", 0.0, Weights(4)), tether);
+  AddObject(&Next("tether", place, "N/m", 0.0, Weights(4)), tether);
 }
 
-void StepForces::AddGravity(std::vector<Candidate>* candidates) {
+void StepForces::AddGravity() {
   // f = sum_b m_b J_b^T dg, w = [m R^T dg; 0]
   MatrixXd weights = MatrixXd::Zero(n_, 3);
   for (const Link& link : links_)
     weights += link.body->mass * link.J.topRows<3>().transpose() * link.X.linear().transpose();
-  Candidate& gravity = Next(candidates, kGravity, kWorld, "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
+  Candidate& gravity = Next(kGravity, kWorld, "m/s^2", 0.0, VectorXd::Constant(3, 20.0));
   AddRobot(&gravity, weights);
   if (store_.setup().has_object()) {
     Matrix6Xd object = Matrix6Xd::Zero(6, 3);
@@ -298,7 +284,7 @@ void StepForces::AddGravity(std::vector<Candidate>* candidates) {
     AddObject(&gravity, object);
   }
   const MatrixXd all = RowsOf(&gravity);
-  Candidate& size = Next(candidates, kGravitySize, kWorld, "m/s^2", 0.0, gravity.scale.head(1));
+  Candidate& size = Next(kGravitySize, kWorld, "m/s^2", 0.0, gravity.scale.head(1));
   size.is_possible = nullptr;
   RowsOf(&size) = all * model_.gravity().normalized();
 }

@@ -74,23 +74,19 @@ class StepForces {
     return candidate->columns.middleRows(begin_, rows());
   }
   /// The next candidate of the list, made at the first step. @param scale plausible sizes.
-  Candidate& Next(std::vector<Candidate>* candidates, const char* fault, const std::string& place,
-                  const std::string& unit, double nominal, const VectorXd& scale);
+  Candidate& Next(const char* fault, const std::string& place, const std::string& unit, double nominal,
+                  const VectorXd& scale);
   /// Plausible sizes of `count` amplitudes: that times the weight or mass of all.
   [[nodiscard]] VectorXd Weights(Eigen::Index count) const { return VectorXd::Constant(count, weight_); }
   [[nodiscard]] VectorXd Masses(Eigen::Index count) const { return VectorXd::Constant(count, mass_); }
-  /// Plausible sizes of a centre of mass, and of the inertia about the old one.
-  [[nodiscard]] VectorXd Moved() const;
-  Candidate& AddForceAtPoint(std::vector<Candidate>* candidates, const std::string& place);
   void AddRobot(Candidate* candidate, const Eigen::Ref<const MatrixXd>& f) const;
   void AddObject(Candidate* candidate, const Matrix6Xd& w) const;
-  void AddJoints(std::vector<Candidate>* candidates);
+  void AddJoints();
   /// @param R, V, V_dot of the centre of mass, in the body's axes. @param link null for the object.
   void AddBody(const std::string& place, const MassProperties& body, const Matrix3d& R, const Vector6d& V,
-               const Vector6d& V_dot, const Link* link, std::vector<Candidate>* candidates);
-  void AddLink(int link, std::vector<Candidate>* candidates);
-  void AddObjectForces(std::vector<Candidate>* candidates);
-  void AddGravity(std::vector<Candidate>* candidates);
+               const Vector6d& V_dot, const Link* link);
+  void AddObjectForces();
+  void AddGravity();
 
   const StepStore& store_;
   RobotModel model_;  // with a frame at each link's centre of mass, after its own
@@ -98,7 +94,8 @@ class StepForces {
   Eigen::Index n_, rows_;
   int first_link_ = 0, wheels_ = 0, dry_ = 0;
   std::vector<Link> links_;
-  VectorXd row_;  // of the store
+  VectorXd row_;                                  // of the store
+  std::vector<Candidate>* candidates_ = nullptr;  // that get columns
   Eigen::Index begin_ = 0, steps_ = 1;
   size_t next_ = 0;
   VectorXd noise_;                    // of each entry

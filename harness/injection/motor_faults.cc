@@ -34,13 +34,14 @@ double TorqueOf(const FaultContext& context, int entry) {
   return std::max(std::abs(context.tau[entry]), 1e-6);
 }
 
-/// Changes one motor, or all for no entry. @param make a transmission that remembers nothing yet.
+/// Changes one motor, or all for no entry. @param transmit a transmission that remembers nothing yet, of
+/// which each motor gets a copy.
 InjectedFault ChangeMotors(const FaultContext& context, std::optional<int> entry, const std::string& name,
-                           double value, double change, const std::function<Transmit()>& make) {
+                           double value, double change, const Transmit& transmit) {
   InjectedFault fault = FaultAt(entry ? NameMotor(context, *entry) : "all motors", name, value, change);
-  fault.motors = [entry, make](const Setup&) -> MotorFault {
-    return [entry, make, all = std::vector<Transmit>()](double t, VectorXd* tau) mutable {
-      while (all.size() < static_cast<size_t>(tau->size())) all.push_back(make());
+  fault.motors = [entry, transmit](const Setup&) -> MotorFault {
+    return [entry, transmit, all = std::vector<Transmit>()](double t, VectorXd* tau) mutable {
+      all.resize(static_cast<size_t>(tau->size()), transmit);
       for (int i = entry.value_or(0); i < (entry ? *entry + 1 : tau->size()); ++i)
         (*tau)[i] = all[static_cast<size_t>(i)]((*tau)[i], t);
     };
@@ -50,45 +51,31 @@ InjectedFault ChangeMotors(const FaultContext& context, std::optional<int> entry
 
 // Transmissions.
 
-std::function<Transmit()> Pure(const Transmit& transmit) {
-  return [transmit] { return transmit; };
-}
-
-std::function<Transmit()> Late(size_t steps) {
-  return [steps]() -> Transmit {
-    return [steps, sent = std::deque<double>()](double u, double) mutable {
-      sent.push_back(u);
-      if (sent.size() > steps + 1) sent.pop_front();
-      return sent.front();
-    };
+Transmit Late(size_t steps) {
+  return [steps, sent = std::deque<double>()](double u, double) mutable {
+    sent.push_back(u);
+    if (sent.size() > steps + 1) sent.pop_front();
+    return sent.front();
   };
 }
 
 /// a' = (u - a) / time.
-std::function<Transmit()> Lag(double time, double time_step) {
-  return [time, time_step]() -> Transmit {
-    return [time, time_step, output = std::nan("")](double u, double t) mutable {
-      // Until it begins it keeps up.
-      if (std::isnan(output) || t < 0.0) output = u;
-      output += (1.0 - std::exp(-time_step / time)) * (u - output);
-      return output;
-    };
+Transmit Lag(double time, double time_step) {
+  return [time, time_step, output = std::nan("")](double u, double t) mutable {
+    // Until it begins it keeps up.
+    if (std::isnan(output) || t < 0.0) output = u;
+    output += (1.0 - std::exp(-time_step / time)) * (u - output);
+    return output;
   };
 }
 
-std::function<Transmit()> Noise(double size) {
-  return [size]() -> Transmit {
-    return [size, random = std::mt19937_64(7)](double u, double) mutable {
-      // The sum of twelve uniform numbers has variance 1.
-      double sum = -6.0;
-      for (int i = 0; i < 12; ++i) sum += DrawUnit(&random);
-      return u + size * sum;
-    };
+Transmit Noise(double size) {
+  return [size, random = std::mt19937_64(7)](double u, double) mutable {
+    // The sum of twelve uniform numbers has variance 1.
+    double sum = -6.0;
+    for (int i = 0; i < 12; ++i) sum += DrawUnit(&random);
+    return u + size * sum;
   };
-}
-
-Transmit Round(double step) {
-  return [step](double u, double) { return step * std::round(u / step); };
 }
 
 // Kinds.
@@ -102,7 +89,7 @@ template <bool kAll>
 InjectedFault Gain(const FaultContext& context) {
   const double gain = 1.0 + (kAll ? context.draw->Size(1e-4, 1e-2) : context.draw->Size(0.005, 0.2));
   return ChangeMotors(context, DrawEntry(context, kAll), "gain", gain, gain - 1.0,
-                      Pure([gain](double u, double) { return gain * u; }));
+                      [gain](double u, double) { return gain * u; });
 }
 
 /// Changes the gain of the engine's own actuator.
@@ -125,22 +112,21 @@ InjectedFault Offset(const FaultContext& context) {
   const double begin = kForAWhile ? context.draw->Uniform(0.0, 0.5 * context.duration) : 0.0;
   const double end = kForAWhile ? begin + 0.3 * context.duration : HUGE_VAL;
   return ChangeMotors(context, DrawEntry(context), "offset", offset, offset,
-                      Pure([=](double u, double t) { return begin <= t && t < end ? u + offset : u; }));
+                      [=](double u, double t) { return begin <= t && t < end ? u + offset : u; });
 }
 
 InjectedFault Drift(const FaultContext& context) {
   const double rate = context.draw->Size(0.01, 1.0);
   const double begin = context.draw->Uniform(0.0, 0.3 * context.duration);
   return ChangeMotors(context, DrawEntry(context), "drift", rate, rate,
-                      Pure([=](double u, double t) { return u + rate * std::max(0.0, t - begin); }));
+                      [=](double u, double t) { return u + rate * std::max(0.0, t - begin); });
 }
 
 InjectedFault Ripple(const FaultContext& context) {
   const double size = context.draw->Positive(1e-3, 0.1);
   const double frequency = context.draw->Uniform(3.0, 15.0) / context.duration;
-  return ChangeMotors(context, DrawEntry(context), "ripple", size, size, Pure([=](double u, double t) {
-                        return u + size * std::sin(2.0 * kPi * frequency * t);
-                      }));
+  return ChangeMotors(context, DrawEntry(context), "ripple", size, size,
+                      [=](double u, double t) { return u + size * std::sin(2.0 * kPi * frequency * t); });
 }
 
 template <bool kAll>
@@ -159,9 +145,9 @@ InjectedFault LagOf(const FaultContext& context) {
 InjectedFault DeadZone(const FaultContext& context) {
   const int entry = DrawEntry(context);
   const double zone = context.draw->Positive(0.02, 0.8) * TorqueOf(context, entry);
-  return ChangeMotors(context, entry, "dead zone", zone, zone, Pure([zone](double u, double) {
-                        return std::abs(u) > zone ? u - std::copysign(zone, u) : 0.0;
-                      }));
+  return ChangeMotors(context, entry, "dead zone", zone, zone, [zone](double u, double) {
+    return std::abs(u) > zone ? u - std::copysign(zone, u) : 0.0;
+  });
 }
 
 template <bool kAll>
@@ -169,21 +155,22 @@ InjectedFault Rounding(const FaultContext& context) {
   const std::optional<int> entry = DrawEntry(context, kAll);
   const double step = kAll ? context.draw->Positive(1e-3, 1e-2)
                            : context.draw->Positive(1e-3, 0.2) * TorqueOf(context, *entry);
-  return ChangeMotors(context, entry, "rounding to steps of", step, step, Pure(Round(step)));
+  return ChangeMotors(context, entry, "rounding to steps of", step, step,
+                      [step](double u, double) { return step * std::round(u / step); });
 }
 
 InjectedFault Limit(const FaultContext& context) {
   const int entry = DrawEntry(context);
   const double most = context.draw->Uniform(0.3, 0.95) * TorqueOf(context, entry);
   return ChangeMotors(context, entry, "limit", most, TorqueOf(context, entry) - most,
-                      Pure([most](double u, double) { return std::clamp(u, -most, most); }));
+                      [most](double u, double) { return std::clamp(u, -most, most); });
 }
 
 InjectedFault Stuck(const FaultContext& context) {
   const int entry = DrawEntry(context);
   const double torque = context.draw->Uniform(-0.9, 0.9) * context.tau[entry];
   return ChangeMotors(context, entry, "stuck at", torque, torque - context.tau[entry],
-                      Pure([torque](double, double) { return torque; }));
+                      [torque](double, double) { return torque; });
 }
 
 InjectedFault NoiseOfOne(const FaultContext& context) {

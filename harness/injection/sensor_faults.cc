@@ -21,6 +21,7 @@ JointEntry DrawEntry(const FaultContext& context) {
           model.num_base_velocities() + model.dof(joint)};
 }
 
+/// @param change_state remembers nothing yet: each run gets a copy.
 InjectedFault Sensor(const std::string& place, const std::string& name, double value, double change,
                      const SensorFault& change_state) {
   InjectedFault fault = FaultAt(place, name, value, change);
@@ -59,14 +60,10 @@ InjectedFault Noise(const FaultContext& context) {
   const JointEntry joint = DrawEntry(context);
   const double most = context.draw->Positive(1e-6, 1e-4);
   const double deviation = most / std::sqrt(3.0);
-  InjectedFault fault =
-      FaultAt(joint.name + ", position", "noise, standard deviation", deviation, 5.0 * deviation);
-  fault.sensors = [i = joint.q, most](const Setup&) -> SensorFault {
-    return [i, most, random = std::mt19937_64(5)](double, MeasuredState* state) mutable {
-      state->q[i] += most * (2.0 * DrawUnit(&random) - 1.0);
-    };
-  };
-  return fault;
+  return Sensor(joint.name + ", position", "noise, standard deviation", deviation, 5.0 * deviation,
+                [i = joint.q, most, random = std::mt19937_64(5)](double, MeasuredState* state) mutable {
+                  state->q[i] += most * (2.0 * DrawUnit(&random) - 1.0);
+                });
 }
 
 InjectedFault Rounding(const FaultContext& context) {
@@ -88,15 +85,12 @@ InjectedFault Stuck(const FaultContext& context) {
 InjectedFault DelayOfAll(const FaultContext& context) {
   const size_t steps = 1 + context.draw->Index(3);
   const auto value = static_cast<double>(steps);
-  InjectedFault fault = FaultAt("everything that is measured", "delay", value, value);
-  fault.sensors = [steps](const Setup&) -> SensorFault {
-    return [steps, before = std::vector<MeasuredState>()](double, MeasuredState* state) mutable {
-      before.push_back(*state);
-      if (before.size() > steps + 1) before.erase(before.begin());
-      *state = before.front();
-    };
-  };
-  return fault;
+  return Sensor("everything that is measured", "delay", value, value,
+                [steps, before = std::vector<MeasuredState>()](double, MeasuredState* state) mutable {
+                  before.push_back(*state);
+                  if (before.size() > steps + 1) before.erase(before.begin());
+                  *state = before.front();
+                });
 }
 
 InjectedFault Heading(const FaultContext& context) {

@@ -380,7 +380,7 @@ RecordingJudgement JudgeRecordings(const RobotModel& model, std::vector<Recordin
     refined.refinements = refinements;
     return Judge(corrected, recordings, refined, has_others, count).Run();
   };
-  return Readings(model, recordings, options, on_rows, judge).Run();
+  return ReadUntilSettled(model, recordings, options, on_rows, judge);
 }
 
 }  // namespace dexcheck

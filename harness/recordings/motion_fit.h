@@ -115,6 +115,10 @@ class MotionFit {
   bool ReadRow(Row* row);
   bool Fill();
   void Analyse();
+  /// Finds the usual step, replaces wrong samples, undoes jumps and divides the rows where there are gaps.
+  void CheckRows();
+  /// Noise of each channel: what polynomials over short windows leave.
+  [[nodiscard]] VectorXd MeasureNoise(const std::vector<size_t>& centres, size_t half) const;
   void ChooseWindow(const std::vector<size_t>& centres);
   void CalcSpeeds();
   void AddWrenchErrors();

@@ -131,7 +131,30 @@ void MotionFit::UndoJumps() {
   last_ += jumps_;
 }
 
-void MotionFit::Analyse() {
+VectorXd MotionFit::MeasureNoise(const std::vector<size_t>& centres, size_t half) const {
+  const int time = ChannelOf(RecordedQuantity::kTime, -1);
+  std::vector<std::vector<double>> left(static_cast<size_t>(last_.size()));
+  for (const size_t centre : centres) {
+    const MatrixXd window = GetWindow(centre, half);
+    const MatrixXd C = CalcCoefficients(centre, half, kOrder);
+    MatrixXd V = MatrixXd::Ones(window.rows(), kOrder + 1);
+    for (int p = 1; p <= kOrder; ++p)
+      V.col(p) = V.col(p - 1).array() * (window.col(time).array() - rows_ahead_[centre][time]);
+    const MatrixXd rest = window - V * (C * window);
+    for (Eigen::Index i = 0; i < rest.cols(); ++i)
+      left[static_cast<size_t>(i)].push_back(rest.col(i).squaredNorm() /
+                                             std::max(1.0, static_cast<double>(rest.rows() - kOrder - 1)));
+  }
+  VectorXd sigma(last_.size());
+  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
+    constexpr double kMedianToMean = 1.06;  // of chi^2 with twelve degrees of freedom
+    sigma[i] = std::sqrt(
+        std::max(kMedianToMean * Median(left[static_cast<size_t>(i)]), Square(FindQuantum(i)) / 12.0));
+  }
+  return sigma;
+}
+
+void MotionFit::CheckRows() {
   const std::string& name = recording_->name;
   constexpr size_t kFewest = 16;
   if (rows_ahead_.size() < kFewest) {
@@ -158,6 +181,10 @@ void MotionFit::Analyse() {
     if (steps[i - 1] > kGap * facts_.step) ++segment_, ++gaps_;
     segments_[i] = segment_;
   }
+}
+
+void MotionFit::Analyse() {
+  CheckRows();
   const Eigen::Index n = model_->num_joints();
   for (VectorXd* vector : {&facts_.position, &facts_.velocity, &facts_.torque, &facts_.smooth_position,
                            &facts_.smooth_torque, &facts_.acceleration, &facts_.rest, &sample_.q, &sample_.qd,
@@ -165,57 +192,36 @@ void MotionFit::Analyse() {
                            &sample_.direction, &sample_.slowest, &sample_.beyond, &sample_.most_torque})
     *vector = VectorXd::Zero(n);
   sample_.friction = MatrixXd::Zero(n, kFrictionShapes);
-  // Noise of each channel: what a polynomial over a short window leaves.
   constexpr size_t kShort = 8;
   const size_t half = std::min(kShort, (rows_ahead_.size() - 1) / 2);
   const std::vector<size_t> centres = ListCentres(half);
   if (centres.empty())
-    throw InputError(name + ": has gaps everywhere: no " + std::to_string(2 * half + 1) +
+    throw InputError(recording_->name + ": has gaps everywhere: no " + std::to_string(2 * half + 1) +
                      " rows follow each other");
-  VectorXd sigma(last_.size());
-  std::vector<std::vector<double>> left(static_cast<size_t>(last_.size()));
-  for (const size_t centre : centres) {
-    const MatrixXd window = GetWindow(centre, half);
-    const MatrixXd C = CalcCoefficients(centre, half, kOrder);
-    const double t = rows_ahead_[centre][time];
-    MatrixXd V(window.rows(), kOrder + 1);
-    for (Eigen::Index k = 0; k < V.rows(); ++k)
-      for (int p = 0; p <= kOrder; ++p) V(k, p) = std::pow(window(k, time) - t, p);
-    const MatrixXd rest = window - V * (C * window);
-    for (Eigen::Index i = 0; i < rest.cols(); ++i)
-      left[static_cast<size_t>(i)].push_back(rest.col(i).squaredNorm() /
-                                             std::max(1.0, static_cast<double>(rest.rows() - kOrder - 1)));
-  }
-  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
-    constexpr double kMedianToMean = 1.06;  // of chi^2 with twelve degrees of freedom
-    sigma[i] = std::sqrt(
-        std::max(kMedianToMean * Median(left[static_cast<size_t>(i)]), Square(FindQuantum(i)) / 12.0));
-  }
-  for (int joint = 0; joint < n; ++joint) {
-    const auto get = [&](RecordedQuantity quantity) {
-      const int channel = ChannelOf(quantity, joint);
-      return channel < 0 ? 0.0 : sigma[channel];
-    };
-    facts_.position[joint] = get(RecordedQuantity::kPosition);
-    constexpr double kMuch = 0.5;
-    if (const int position = ChannelOf(RecordedQuantity::kPosition, joint); position >= 0)
-      facts_.is_quantised =
-          facts_.is_quantised ||
-          (sigma[position] > 0.0 && FindQuantum(position) / std::sqrt(12.0) > kMuch * sigma[position]);
-    facts_.velocity[joint] = get(RecordedQuantity::kVelocity);
-    facts_.torque[joint] = get(Effort());
-    for (const Row& row : rows_ahead_)
-      if (const int channel = ChannelOf(Effort(), joint); channel >= 0)
-        sample_.most_torque[joint] =
-            std::max(sample_.most_torque[joint], std::abs(row[channel]) - 3.0 * facts_.torque[joint]);
-  }
+  const VectorXd sigma = MeasureNoise(centres, half);
   facts_.wrench = sample_.wrench = VectorXd::Zero(6 * static_cast<Eigen::Index>(recording_->wrenches.size()));
-  for (int k = 0; k < facts_.wrench.size(); ++k)
-    if (const int channel = ChannelOf(RecordedQuantity::kWrench, k); channel >= 0)
-      facts_.wrench[k] = sigma[channel];
-  VectorXd base = VectorXd::Zero(2);
-  for (int k = 0; k < 7 && recording_->Has(RecordedQuantity::kBase); ++k)
-    base[k / 3 > 0 ? 1 : 0] += Square(sigma[ChannelOf(RecordedQuantity::kBase, k)]);
+  Vector2d base = Vector2d::Zero();
+  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
+    const Channel& channel = recording_->channels[static_cast<size_t>(i)];
+    if (channel.quantity == RecordedQuantity::kPosition) {
+      constexpr double kMuch = 0.5;
+      facts_.position[channel.joint] = sigma[i];
+      facts_.is_quantised =
+          facts_.is_quantised || (sigma[i] > 0.0 && FindQuantum(i) / std::sqrt(12.0) > kMuch * sigma[i]);
+    } else if (channel.quantity == RecordedQuantity::kVelocity) {
+      facts_.velocity[channel.joint] = sigma[i];
+    } else if (channel.quantity == Effort()) {
+      facts_.torque[channel.joint] = sigma[i];
+      for (const Row& row : rows_ahead_) {
+        double& most = sample_.most_torque[channel.joint];
+        most = std::max(most, std::abs(row[i]) - 3.0 * sigma[i]);
+      }
+    } else if (channel.quantity == RecordedQuantity::kWrench) {
+      facts_.wrench[channel.joint] = sigma[i];
+    } else if (channel.quantity == RecordedQuantity::kBase) {
+      base[channel.joint / 3 > 0 ? 1 : 0] += Square(sigma[i]);
+    }
+  }
   CheckVelocities();
   ReportWrongSamples();
   facts_.stands = Stands();

@@ -90,8 +90,14 @@ bool LeavesLess(const RecordingJudgement& one, const RecordingJudgement& other, 
   return most > of_joint && all > of_all;
 }
 
+/// A judgement beside faults that were undone.
+struct TriedReading {
+  RecordingJudgement judgement;
+  std::vector<NonlinearFault> faults = {};
+};
+
 /// Returns how many numbers explain a reading.
-long CountNumbers(const Readings::Reading& reading) {
+long CountNumbers(const TriedReading& reading) {
   long count = CountNumbers(reading.judgement);
   for (const NonlinearFault& one : reading.faults)
     count += one.CountNumbers() + (one.IsOfModel() ? kRarer : 0);
@@ -99,7 +105,7 @@ long CountNumbers(const Readings::Reading& reading) {
 }
 
 /// Whether a reading explains more, or the same with fewer numbers.
-bool IsBetter(const Readings::Reading& one, const Readings::Reading& other) {
+bool IsBetter(const TriedReading& one, const TriedReading& other) {
   const RecordingJudgement &a = one.judgement, &b = other.judgement;
   if (a.unjudged.size() != b.unjudged.size()) return a.unjudged.size() < b.unjudged.size();
   if (a.IsWhole() != b.IsWhole()) return a.IsWhole();
@@ -119,112 +125,134 @@ RobotModel Correct(const RobotModel& model, const std::vector<NonlinearFault>& f
   return RobotModel(std::move(spec));
 }
 
+class Readings {
+ public:
+  Readings(const RobotModel& model, std::vector<Recording>* recordings, const JudgeOptions& options,
+           const OnRows& on_rows, const JudgeOnce& judge)
+      : model_(model),
+        recordings_(recordings),
+        options_(options),
+        judge_(judge),
+        count_([this, on_rows](long rows) { return goes_on_ = !on_rows || on_rows(rows); }),
+        refinements_(options.refinements) {}
+
+  RecordingJudgement Run() {
+    TriedReading reading{Judge({}, refinements_)};
+    AdvanceVelocities(&reading);
+    Search(/*of_model=*/false, &reading);
+    Refine(&reading);
+    Search(/*of_model=*/true, &reading);
+    // Beside what nothing explains, a number explains a part of anything.
+    for (const NonlinearFault& fault : reading.faults)
+      reading.judgement.by_causes.numbers += fault.CountNumbers();
+    for (const NonlinearFault& fault : reading.faults) {
+      Explanation one = MakeCause(model_, options_.frames, fault);
+      if (fault.number != NonlinearFault::Number::kNone && !reading.judgement.IsWhole())
+        one.outcome = CauseOutcome::kNotExplained;
+      reading.judgement.causes.insert(reading.judgement.causes.begin(), std::move(one));
+    }
+    return std::move(reading.judgement);
+  }
+
+ private:
+  /// Opens all recordings again and undoes these faults; false where that cannot be.
+  bool Reopen(const std::vector<NonlinearFault>& faults) {
+    for (Recording& one : *recordings_) {
+      if (!one.reopen) return false;
+      one = one.reopen();
+      for (const NonlinearFault& fault : faults) fault.Undo(&one);
+    }
+    return true;
+  }
+
+  RecordingJudgement Judge(const std::vector<NonlinearFault>& faults, const Refinements& refinements) {
+    RecordingJudgement judgement = judge_(Correct(model_, faults), refinements, !faults.empty(), count_);
+    for (const NonlinearFault& fault : faults) judgement.undone += fault.CountNumbers();
+    return judgement;
+  }
+
+  /// Decides whether forces follow from velocities at the positions' times.
+  void AdvanceVelocities(TriedReading* reading) {
+    // A simulator's forces are those of the velocity that it has at a step, a robot's those of the position's
+    // time.
+    if (!goes_on_ || !reading->judgement.has_other_times || !Reopen({})) return;
+    refinements_.advances_velocities = true;
+    RecordingJudgement other = Judge({}, refinements_);
+    if (goes_on_ && CalcLeft(other) < CalcLeft(reading->judgement)) {
+      reading->judgement = std::move(other);
+    } else {
+      refinements_.advances_velocities = false;
+    }
+  }
+
+  /// Undoes one nonlinear fault after the other while that explains more.
+  /// @param of_model of the geometry; otherwise of the recording.
+  void Search(bool of_model, TriedReading* best) {
+    constexpr size_t kMostFaults = 3;
+    TriedReading now = *best;
+    // A wrong geometry looks like wrong numbers of positions.
+    if (of_model)
+      std::erase_if(now.faults,
+                    [](const NonlinearFault& one) { return one.number != NonlinearFault::Number::kNone; });
+    while (goes_on_ && options_.tries_positions && now.faults.size() < kMostFaults &&
+           MayBeOtherwise(now.judgement)) {
+      if (!recordings_->front().reopen) {
+        if (!of_model)
+          best->judgement.notes.push_back(
+              recordings_->front().name +
+              ": is read once: other signs, units, offsets and orders of positions are not tried");
+        return;
+      }
+      Recording begin = recordings_->front().reopen();
+      for (const NonlinearFault& fault : now.faults) fault.Undo(&begin);
+      const std::optional<NonlinearFault> fault =
+          FindNonlinearFault(Correct(model_, now.faults), std::move(begin), of_model);
+      const auto is_like = [&](const NonlinearFault& one) { return one.fault.IsLike(fault->fault); };
+      if (!fault || std::ranges::any_of(now.faults, is_like)) return;
+      now.faults.push_back(*fault);
+      if (!Reopen(now.faults)) return;
+      now.judgement = Judge(now.faults, refinements_);
+      // A wrong geometry always explains a part of something.
+      if (of_model) Refine(&now);
+      // Fewer numbers than before, or none at all.
+      const long others = CountNumbers(now.judgement);
+      const bool replaces_others = now.judgement.IsWhole() && (others < CountNumbers(*best) ||
+                                                               (others == 0 && !best->judgement.IsWhole()));
+      const bool is_better = (!of_model || replaces_others) && IsBetter(now, *best);
+      if (is_better) *best = now;
+      if (of_model || (!is_better && fault->number != NonlinearFault::Number::kNone)) return;
+    }
+  }
+
+  /// Reads again with the refinements of the reading before, until these settle.
+  void Refine(TriedReading* reading) {
+    constexpr int kReadings = 5;
+    Refinements known = refinements_;
+    for (int i = 1; i < kReadings && goes_on_ && reading->judgement.refinements != known; ++i) {
+      known = reading->judgement.refinements;
+      if (!Reopen(reading->faults)) return;
+      RecordingJudgement again = Judge(reading->faults, known);
+      // Rows that a reading leaves out are no reason to find nothing.
+      if (again.Agrees()) return;
+      reading->judgement = std::move(again);
+    }
+  }
+
+  const RobotModel& model_;
+  std::vector<Recording>* recordings_;
+  const JudgeOptions& options_;
+  const JudgeOnce& judge_;
+  OnRows count_;
+  Refinements refinements_;
+  bool goes_on_ = true;
+};
+
 }  // namespace
 
-Readings::Readings(const RobotModel& model, std::vector<Recording>* recordings, const JudgeOptions& options,
-                   const OnRows& on_rows, JudgeOnce judge)
-    : model_(model),
-      recordings_(recordings),
-      options_(options),
-      judge_(std::move(judge)),
-      count_([this, on_rows](long rows) { return goes_on_ = !on_rows || on_rows(rows); }),
-      refinements_(options.refinements) {}
-
-bool Readings::Reopen(const std::vector<NonlinearFault>& faults) {
-  for (Recording& one : *recordings_) {
-    if (!one.reopen) return false;
-    one = one.reopen();
-    for (const NonlinearFault& fault : faults) fault.Undo(&one);
-  }
-  return true;
-}
-
-RecordingJudgement Readings::Judge(const std::vector<NonlinearFault>& faults,
-                                   const Refinements& refinements) {
-  RecordingJudgement judgement = judge_(Correct(model_, faults), refinements, !faults.empty(), count_);
-  for (const NonlinearFault& fault : faults) judgement.undone += fault.CountNumbers();
-  return judgement;
-}
-
-RecordingJudgement Readings::Run() {
-  Reading reading{Judge({}, refinements_)};
-  AdvanceVelocities(&reading);
-  Search(/*of_model=*/false, &reading);
-  Refine(&reading);
-  Search(/*of_model=*/true, &reading);
-  // Beside what nothing explains, a number explains a part of anything.
-  for (const NonlinearFault& fault : reading.faults)
-    reading.judgement.by_causes.numbers += fault.CountNumbers();
-  for (const NonlinearFault& fault : reading.faults) {
-    Explanation one = MakeCause(model_, options_.frames, fault);
-    if (fault.number != NonlinearFault::Number::kNone && !reading.judgement.IsWhole())
-      one.outcome = CauseOutcome::kNotExplained;
-    reading.judgement.causes.insert(reading.judgement.causes.begin(), std::move(one));
-  }
-  return std::move(reading.judgement);
-}
-
-void Readings::AdvanceVelocities(Reading* reading) {
-  // A simulator's forces are those of the velocity that it has at a step, a robot's those of the position's
-  // time.
-  if (!goes_on_ || !reading->judgement.has_other_times || !Reopen({})) return;
-  refinements_.advances_velocities = true;
-  RecordingJudgement other = Judge({}, refinements_);
-  if (goes_on_ && CalcLeft(other) < CalcLeft(reading->judgement)) {
-    reading->judgement = std::move(other);
-  } else {
-    refinements_.advances_velocities = false;
-  }
-}
-
-void Readings::Search(bool of_model, Reading* best) {
-  constexpr size_t kMostFaults = 3;
-  Reading now = *best;
-  // A wrong geometry looks like wrong numbers of positions.
-  if (of_model)
-    std::erase_if(now.faults,
-                  [](const NonlinearFault& one) { return one.number != NonlinearFault::Number::kNone; });
-  while (goes_on_ && options_.tries_positions && now.faults.size() < kMostFaults &&
-         MayBeOtherwise(now.judgement)) {
-    if (!recordings_->front().reopen) {
-      if (!of_model)
-        best->judgement.notes.push_back(
-            recordings_->front().name +
-            ": is read once: other signs, units, offsets and orders of positions are not tried");
-      return;
-    }
-    Recording begin = recordings_->front().reopen();
-    for (const NonlinearFault& fault : now.faults) fault.Undo(&begin);
-    const std::optional<NonlinearFault> fault =
-        FindNonlinearFault(Correct(model_, now.faults), std::move(begin), of_model);
-    const auto is_like = [&](const NonlinearFault& one) { return one.fault.IsLike(fault->fault); };
-    if (!fault || std::ranges::any_of(now.faults, is_like)) return;
-    now.faults.push_back(*fault);
-    if (!Reopen(now.faults)) return;
-    now.judgement = Judge(now.faults, refinements_);
-    // A wrong geometry always explains a part of something.
-    if (of_model) Refine(&now);
-    // Fewer numbers than before, or none at all.
-    const long others = CountNumbers(now.judgement);
-    const bool replaces_others = now.judgement.IsWhole() && (others < CountNumbers(*best) ||
-                                                             (others == 0 && !best->judgement.IsWhole()));
-    const bool is_better = (!of_model || replaces_others) && IsBetter(now, *best);
-    if (is_better) *best = now;
-    if (of_model || (!is_better && fault->number != NonlinearFault::Number::kNone)) return;
-  }
-}
-
-void Readings::Refine(Reading* reading) {
-  constexpr int kReadings = 5;
-  Refinements known = refinements_;
-  for (int i = 1; i < kReadings && goes_on_ && reading->judgement.refinements != known; ++i) {
-    known = reading->judgement.refinements;
-    if (!Reopen(reading->faults)) return;
-    RecordingJudgement again = Judge(reading->faults, known);
-    // Rows that a reading leaves out are no reason to find nothing.
-    if (again.Agrees()) return;
-    reading->judgement = std::move(again);
-  }
+RecordingJudgement ReadUntilSettled(const RobotModel& model, std::vector<Recording>* recordings,
+                                    const JudgeOptions& options, const OnRows& on_rows,
+                                    const JudgeOnce& judge) {
+  return Readings(model, recordings, options, on_rows, judge).Run();
 }
 
 }  // namespace dexcheck

@@ -43,13 +43,11 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   bodies_.resize(n, TorqueRegressor::kBody * n);
   gravity_.resize(n, 3);
   forces_.resize(n, 6);
-  by_position_.resize(n, n);
   shaking_.resize(n, 12);
   along_.resize(n, kAlong * n);
   torques_in_time_.resize(n, 3);
   torques_.resize(n);
   late_.resize(n);
-  q_.resize(n);
   residual_ = VectorXd::Zero(static_cast<Index>(joints.size()));
   for (int k = 0; k < kGeometries * n && n <= kMostWithGeometry; ++k) {
     RobotSpec spec = model.spec();
@@ -134,20 +132,16 @@ double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const Rec
     case TorqueColumn::kTorque:
       return torques_[joint] + CalcFriction(joint, sample);
     case TorqueColumn::kPosition:
-      return by_position_(joint, column.index);
-    case TorqueColumn::kBacklash:
-      return std::copysign(by_position_(joint, column.index),
-                           by_position_(joint, column.index) * torques_[column.index]);
     case TorqueColumn::kElastic:
-      return along_(joint, kAlong * column.index);
     case TorqueColumn::kLatePosition:
-      return along_(joint, kAlong * column.index + 1);
+    case TorqueColumn::kPositionGain:
+    case TorqueColumn::kTurn:
+      return along_(joint,
+                    kAlong * column.index + (column.kind - TorqueColumn::kPosition) + column.component);
+    case TorqueColumn::kBacklash:
+      return std::copysign(1.0, torques_[column.index]) * along_(joint, kAlong * column.index);
     case TorqueColumn::kGeometry:
       return geometry_(joint, kGeometries * column.index + column.component);
-    case TorqueColumn::kPositionGain:
-      return along_(joint, kAlong * column.index + 2);
-    case TorqueColumn::kTurn:
-      return along_(joint, kAlong * column.index + 3 + column.component);
     case TorqueColumn::kCutOff:
       return CalcCutOff(joint, column.component, sample);
     case TorqueColumn::kGravity:
@@ -232,12 +226,13 @@ void TorqueBalance::CalcShakingColumns(const RecordedSample& sample) {
 
 Vector3d TorqueBalance::CalcMotionChange(int joint, int k, const RecordedSample& sample) const {
   const double rate = sample.qd[joint], acceleration = sample.qdd[joint];
-  if (k == 0) return torques_in_time_.row(joint).transpose();
-  if (k == 1) return {rate, acceleration, sample.jerk[joint]};
-  if (k == 2) return {sample.q[joint], rate, acceleration};
-  const double turns = k < 5 ? 1.0 : 2.0, angle = turns * sample.q[joint];
-  const double e = k % 2 == 1 ? std::sin(angle) : std::cos(angle);
-  const double slope = turns * (k % 2 == 1 ? std::cos(angle) : -std::sin(angle));
+  if (k == 0) return Vector3d::UnitX();
+  if (k == 1) return torques_in_time_.row(joint).transpose();
+  if (k == 2) return {rate, acceleration, sample.jerk[joint]};
+  if (k == 3) return {sample.q[joint], rate, acceleration};
+  const double turns = k < 6 ? 1.0 : 2.0, angle = turns * sample.q[joint];
+  const double e = k % 2 == 0 ? std::sin(angle) : std::cos(angle);
+  const double slope = turns * (k % 2 == 0 ? std::cos(angle) : -std::sin(angle));
   return {e, slope * rate, slope * acceleration - turns * turns * e * Square(rate)};
 }
 
@@ -266,25 +261,19 @@ void TorqueBalance::CalcMotionColumns(const RecordedSample& sample) {
   q = sample.q, qd = sample.qd, qdd = sample.qdd;
   for (Index joint = 0; joint < q.size(); ++joint)
     for (int k = 0; k < kAlong; ++k) {
+      const double step = k == 0 ? steps_[joint] : kStep;
       const Vector3d change = CalcMotionChange(static_cast<int>(joint), k, sample);
-      q[joint] += kStep * change[0], qd[joint] += kStep * change[1], qdd[joint] += kStep * change[2];
+      q[joint] += step * change[0], qd[joint] += step * change[1], qdd[joint] += step * change[2];
       auto column = along_.col(kAlong * joint + k);
       regressor_.SetMotion(q, qd, qdd, sample.base);
       regressor_.CalcTorques(column);
-      column = ((column - torques_) / kStep).eval();
+      column = ((column - torques_) / step).eval();
       column[joint] += model_->joint(static_cast<int>(joint)).damping * change[1];
       q[joint] = sample.q[joint], qd[joint] = sample.qd[joint], qdd[joint] = sample.qdd[joint];
     }
 }
 
 void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& is_judged) {
-  q_ = sample.q;
-  for (Index k = 0; k < q_.size(); ++k) {
-    q_[k] += steps_[k];
-    regressor_.SetMotion(q_, sample.qd, sample.qdd, sample.base);
-    regressor_.CalcTorques(by_position_.col(k));
-    q_[k] = sample.q[k];
-  }
   constexpr double kDelay = 1e-6;  // s
   regressor_.SetMotion(sample.q, sample.qd - kDelay * sample.qdd, sample.qdd, sample.base);
   regressor_.CalcTorques(late_);
@@ -294,18 +283,12 @@ void TorqueBalance::Add(const RecordedSample& sample, const std::vector<bool>& i
   CalcMotionColumns(sample);
   regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   regressor_.CalcGravityColumns(gravity_);
-  if (!refinements_.gravity.isZero()) {
-    BaseMotion turned = sample.base;
-    turned.a -= refinements_.gravity;
-    regressor_.SetMotion(sample.q, sample.qd, sample.qdd, turned);
-  }
+  if (refinements_.shaking > 0.0) CalcShakingColumns(sample);
+  BaseMotion turned = sample.base;
+  turned.a -= refinements_.gravity;
+  regressor_.SetMotion(sample.q, sample.qd, sample.qdd, turned);
   regressor_.CalcBodyColumns(bodies_);
-  if (!refinements_.gravity.isZero()) regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
-  by_position_ = (by_position_.colwise() - torques_) * steps_.cwiseInverse().asDiagonal();
-  if (refinements_.shaking > 0.0) {
-    CalcShakingColumns(sample);
-    regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
-  }
+  regressor_.SetMotion(sample.q, sample.qd, sample.qdd, sample.base);
   if (!wrenches_.empty()) {
     const MatrixXd columns = CalcWrenchColumns();
     torques_ += columns * sample.wrench;

@@ -24,23 +24,23 @@ struct TorqueColumn {
     kBody,          ///< By a link's BodyVector: index is the link, component 0 to 9.
     kTorque,        ///< The model's torque of joint index, with its friction.
     kPosition,      ///< By the position of joint index.
-    kBacklash,      ///< The same, with the sign of that joint's torque.
     kElastic,       ///< By its position's yielding to the torque of joint index, with its derivatives.
     kLatePosition,  ///< By a delay of the position of joint index, with its derivatives.
-    kGeometry,      ///< By where joint index stands and how it is turned: GeometryFault's numbers.
     kPositionGain,  ///< By the logarithm of the gain of joint index's position.
     kTurn,  ///< By its error along a turn, with its derivatives: sine and cosine of once, then twice a turn.
-    kCutOff,   ///< By component: 2 of each torque at which it may have been cut off.
-    kGravity,  ///< By component of gravity.
-    kRate,     ///< Of the measured torque.
-    kLate,     ///< By a delay of the velocities.
-    kCurrent,  ///< Measured.
-    kOffset,   ///< 1
-    kDry,      ///< Direction of motion.
-    kViscous,  ///< Velocity.
-    kSquare,   ///< Velocity times its size.
-    kTime,     ///< Since the first row, s.
-    kDryTime,  ///< That times the direction of motion.
+    kBacklash,  ///< kPosition, with the sign of that joint's torque.
+    kGeometry,  ///< By where joint index stands and how it is turned: GeometryFault's numbers.
+    kCutOff,    ///< By component: 2 of each torque at which it may have been cut off.
+    kGravity,   ///< By component of gravity.
+    kRate,      ///< Of the measured torque.
+    kLate,      ///< By a delay of the velocities.
+    kCurrent,   ///< Measured.
+    kOffset,    ///< 1
+    kDry,       ///< Direction of motion.
+    kViscous,   ///< Velocity.
+    kSquare,    ///< Velocity times its size.
+    kTime,      ///< Since the first row, s.
+    kDryTime,   ///< That times the direction of motion.
     kAcceleration,
     kFriction,  ///< RecordedSample::friction, by component.
     kLoad,      ///< Direction times the size of the model's torque.
@@ -118,7 +118,7 @@ class TorqueBalance {
  private:
   static constexpr Eigen::Index kPart = 128;  // rows that are multiplied at once
   static constexpr size_t kMostBlocks = 512;
-  static constexpr int kAlong = 3 + kTurns;
+  static constexpr int kAlong = 4 + kTurns;
 
   void ListColumns(bool has_currents);
   /// Returns the torques that balance a force at each wrench's point and a moment, in its axes: n x 6 each.
@@ -151,7 +151,7 @@ class TorqueBalance {
   std::vector<Block> blocks_;
   double block_samples_ = 1.0;
   // at the sample
-  MatrixXd bodies_, gravity_, forces_, by_position_, shaking_;
+  MatrixXd bodies_, gravity_, forces_, shaking_;
   /// A model with each of kGeometry's numbers in turn, and its torques.
   struct Displaced {
     std::unique_ptr<RobotModel> model;
@@ -160,10 +160,10 @@ class TorqueBalance {
   std::vector<Displaced> displaced_;
   MatrixXd geometry_;         // n x displaced_
   MatrixXd torques_in_time_;  // n x 3: the model's, and their derivatives
-  MatrixXd along_;            // n x kAlong n: kElastic, kLatePosition, kPositionGain, kTurn of each joint
+  MatrixXd along_;            // n x kAlong n: kPosition to kTurn of each joint
   std::vector<WrenchPlace> wrenches_;
   MatrixXd wrench_squares_;
-  VectorXd torques_, late_, q_, steps_, residual_;
+  VectorXd torques_, late_, steps_, residual_;
 };
 
 }  // namespace dexcheck

@@ -399,31 +399,14 @@ class FaultList {
   std::vector<TorqueFault> faults_;
 };
 
-}  // namespace
-
-namespace {
-
 /// Second moments, mass times centre, mass.
 Eigen::Matrix4d PackPseudoInertia(const BodyVector& body) {
-  Matrix3d I;
-  // clang-format off
-  I << body[4], body[7], body[8],
-       body[7], body[5], body[9],
-       body[8], body[9], body[6];
-  // clang-format on
+  const Matrix3d I = ToTensor(body.tail<6>());
   Eigen::Matrix4d pseudo;
   // The second moments are half the trace of I less I.
   pseudo << 0.5 * I.trace() * Matrix3d::Identity() - I, body.segment<3>(1), body.segment<3>(1).transpose(),
       body[0];
   return pseudo;
-}
-
-BodyVector UnpackPseudoInertia(const Eigen::Matrix4d& pseudo) {
-  const Matrix3d moments = pseudo.topLeftCorner<3, 3>();
-  const Matrix3d I = moments.trace() * Matrix3d::Identity() - moments;
-  BodyVector body;
-  body << pseudo(3, 3), pseudo.topRightCorner<3, 1>(), I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2);
-  return body;
 }
 
 }  // namespace
@@ -439,7 +422,12 @@ BodyVector FindNearestBody(const BodyVector& body) {
   // No thinner than readers of descriptions take for a body.
   constexpr double kThinnest = 1e-6;
   const VectorXd possible = eigen.values.cwiseMax(kThinnest * eigen.values.cwiseAbs().maxCoeff());
-  return UnpackPseudoInertia(eigen.vectors * possible.asDiagonal() * eigen.vectors.transpose());
+  const Eigen::Matrix4d pseudo = eigen.vectors * possible.asDiagonal() * eigen.vectors.transpose();
+  const Matrix3d moments = pseudo.topLeftCorner<3, 3>();
+  BodyVector nearest;
+  nearest << pseudo(3, 3), pseudo.topRightCorner<3, 1>(),
+      ToEntries(moments.trace() * Matrix3d::Identity() - moments);
+  return nearest;
 }
 
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,

@@ -67,12 +67,11 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
 }
 
 void TorqueEstimator::WidenErrors() {
-  const std::vector<Index> first = ListFirstColumns();
+  if (selection_.terms.empty()) return;
   std::vector<Index> columns(static_cast<size_t>(CountForced(*recordings_)));
   std::iota(columns.begin(), columns.end(), Index{0});
   for (const CauseTerm& term : selection_.terms)
-    for (Index k = 0; k < term.error.size(); ++k) columns.push_back(first[term.candidate] + k);
-  if (selection_.terms.empty()) return;
+    for (Index k = 0; k < term.error.size(); ++k) columns.push_back(rows_.first[term.candidate] + k);
   const VectorXd errors = CalcClusteredErrors(rows_, CalcLeft(selection_.terms), columns);
   Index at = CountForced(*recordings_);
   for (CauseTerm& term : selection_.terms) {
@@ -121,7 +120,7 @@ void TorqueEstimator::Select() {
   bool is_known = true;
   for (int round = 0; round < kRounds; ++round) {
     rows_ = MakeTorqueRows(*recordings_, faults_, /*is_held=*/false);
-    Compress();
+    R_ = CalcFactor(rows_.CalcProducts(), CountForced(*recordings_));
     // A residual that no cause explains weighs as noise does, and is correlated.
     const double before = std::exchange(
         block_size_,
@@ -141,38 +140,30 @@ void TorqueEstimator::Select() {
 }
 
 void TorqueEstimator::Relinearise() {
-  const std::vector<Index> first = ListFirstColumns();
   std::vector<bool> is_found(faults_.size(), false);
   for (const CauseTerm& term : selection_.terms) is_found[term.candidate] = true;
   for (const CauseTerm& term : selection_.terms) {
-    const TorqueFault& found = faults_[term.candidate];
-    if (found.kind == TorqueFault::kPush) FindTimesOf(term);
+    TorqueFault& found = faults_[term.candidate];
+    VectorXd others = CalcAmplitudes(selection_.terms);
+    others.segment(rows_.first[term.candidate], term.amplitude.size()).setZero();
+    if (found.kind == TorqueFault::kPush)
+      found.push = FindTimes(*recordings_, rows_, rows_.CalcLeft(others), found.push);
     if (!found.IsOfLoad()) continue;
     // So are those that may have been in its place.
-    VectorXd others = VectorXd::Ones(R_.cols());
-    others.head(R_.cols() - 1) = -CalcAmplitudes(selection_.terms);
-    others.segment(first[term.candidate], term.amplitude.size()).setZero();
-    const VectorXd y = R_ * others;
+    const VectorXd y = R_.rightCols<1>() - R_.leftCols(others.size()) * others;
     for (size_t i = 0; i < faults_.size(); ++i) {
       const bool is_same = std::ranges::any_of(term.same, [&](const auto& one) { return one.first == i; });
       if ((faults_[i].index != found.index || faults_[i].recording != found.recording) && !is_same) continue;
       if (is_found[i] && i != term.candidate) continue;
       if (faults_[i].kind == TorqueFault::kCentre || faults_[i].kind == TorqueFault::kPayload)
         PlaceMass(recordings_->model(),
-                  SolveLeastSquares(R_.middleCols(first[i], CountColumns(faults_[i])), y, kIndependent),
+                  SolveLeastSquares(R_.middleCols(rows_.first[i], CountColumns(faults_[i])), y, kIndependent),
                   &faults_[i]);
     }
   }
   for (size_t i = 0; i < faults_.size(); ++i)
     if (faults_[i].kind == TorqueFault::kTorqueGain && faults_[i].index >= 0)
       ScaleWhole(is_found[i] ? selection_.terms : std::vector<CauseTerm>(), &faults_[i]);
-}
-
-void TorqueEstimator::FindTimesOf(const CauseTerm& term) {
-  VectorXd others = CalcAmplitudes(selection_.terms);
-  others.segment(ListFirstColumns()[term.candidate], term.amplitude.size()).setZero();
-  Push& push = faults_[term.candidate].push;
-  push = FindTimes(*recordings_, rows_, rows_.CalcLeft(others), push);
 }
 
 void TorqueEstimator::ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const {
@@ -204,8 +195,6 @@ void TorqueEstimator::Weigh(const VectorXd& left) {
   }
 }
 
-void TorqueEstimator::Compress() { R_ = CalcFactor(rows_.CalcProducts(), CountForced(*recordings_)); }
-
 Index TorqueEstimator::CountForcedRows() const {
   return (R_.leftCols(CountForced(*recordings_)).array() != 0.0).rowwise().any().count();
 }
@@ -226,14 +215,10 @@ CauseSelection TorqueEstimator::SelectAmong() const {
 CauseSelection TorqueEstimator::SelectAmong(const std::vector<bool>& excluded) const {
   const Index width = R_.cols();
   const Index begin = CountForcedRows(), rows = R_.rows() - begin;
-  std::vector<Candidate> candidates;
-  Index at = CountForced(*recordings_);
-  for (const TorqueFault& fault : faults_) {
-    const Index count = CountColumns(fault);
-    Candidate& one = candidates.emplace_back(fault);
-    one.columns = R_.block(begin, at, rows, count);
-    if (excluded[candidates.size() - 1]) one.columns.setZero();
-    at += count;
+  std::vector<Candidate> candidates(faults_.begin(), faults_.end());
+  for (size_t i = 0; i < faults_.size(); ++i) {
+    candidates[i].columns = R_.block(begin, rows_.first[i], rows, CountColumns(faults_[i]));
+    if (excluded[i]) candidates[i].columns.setZero();
   }
   CauseOptions options;
   for (size_t i = 0; i < faults_.size(); ++i) {
@@ -251,22 +236,11 @@ CauseSelection TorqueEstimator::SelectAmong(const std::vector<bool>& excluded) c
   return SelectCauses(R_.col(width - 1).tail(rows), candidates, options);
 }
 
-std::vector<Index> TorqueEstimator::ListFirstColumns() const {
-  std::vector<Index> first;
-  Index at = CountForced(*recordings_);
-  for (const TorqueFault& fault : faults_) {
-    first.push_back(at);
-    at += CountColumns(fault);
-  }
-  return first;
-}
-
 VectorXd TorqueEstimator::CalcAmplitudes(const std::vector<CauseTerm>& terms) const {
   const Index width = R_.cols() - 1;
   VectorXd a = VectorXd::Zero(width);
-  const std::vector<Index> first = ListFirstColumns();
   for (const CauseTerm& term : terms)
-    a.segment(first[term.candidate], term.amplitude.size()) = term.amplitude;
+    a.segment(rows_.first[term.candidate], term.amplitude.size()) = term.amplitude;
   const Index forced = CountForced(*recordings_);
   const Index rows = CountForcedRows();
   const VectorXd right =
@@ -348,7 +322,6 @@ bool TorqueEstimator::IsPart(const TorqueFault& fault, Part part) {
 }
 
 VectorXd TorqueEstimator::FitAmplitudes(Part part, Index* rank) const {
-  const std::vector<Index> first = ListFirstColumns();
   std::vector<Index> columns;
   std::vector<double> plausible;
   for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i), plausible.push_back(1.0);
@@ -357,7 +330,7 @@ VectorXd TorqueEstimator::FitAmplitudes(Part part, Index* rank) const {
     const bool is_part =
         IsPart(faults_[i], part) || (part == Part::kAll && std::ranges::any_of(selection_.terms, is_this));
     for (Index k = 0; k < CountColumns(faults_[i]) && is_part; ++k)
-      columns.push_back(first[i] + k),
+      columns.push_back(rows_.first[i] + k),
           plausible.push_back(faults_[i].scale.size() > 0 ? faults_[i].scale[k]
                                                           : std::max(1.0, std::abs(faults_[i].nominal)));
   }
@@ -407,16 +380,14 @@ HeldPrediction TorqueEstimator::PredictByCauses(const TorqueRows& held) const {
   for (const CauseTerm& term : selection_.terms)
     if (faults_[term.candidate].kind != TorqueFault::kIntegrator) prediction.numbers += term.amplitude.size();
   // An integrator's share is smooth and less than noise: the search may have left it.
-  const std::vector<Index> first = ListFirstColumns();
-  VectorXd signs(R_.cols());
-  signs << -amplitudes, 1.0;
+  const VectorXd rest = R_.rightCols<1>() - R_.leftCols(amplitudes.size()) * amplitudes;
   for (size_t i = 0; i < faults_.size(); ++i) {
     if (faults_[i].kind != TorqueFault::kIntegrator) continue;
     const Index columns = CountColumns(faults_[i]);
-    const VectorXd change = SolveLeastSquares(R_.middleCols(first[i], columns), R_ * signs, kIndependent);
+    const VectorXd change = SolveLeastSquares(R_.middleCols(rows_.first[i], columns), rest, kIndependent);
     VectorXd with = amplitudes;
-    with.segment(first[i], columns) += change;
-    const auto amplitude = with.segment(first[i], columns);
+    with.segment(rows_.first[i], columns) += change;
+    const auto amplitude = with.segment(rows_.first[i], columns);
     if (faults_[i].is_possible(amplitude) && (amplitude.array() >= faults_[i].least.array()).all())
       prediction.held_left = std::min(prediction.held_left, CalcRms(held, held.CalcLeft(with)));
   }

@@ -77,18 +77,13 @@ class TorqueEstimator {
   void Select();
   /// Computes columns of products of faults anew: they are linear in each once the others are known.
   void Relinearise();
-  /// Moves the begin and end of a push to where it explains most.
-  void FindTimesOf(const CauseTerm& term);
   /// A gain's column: the torque of the model and of these causes, where the robot has them.
   void ScaleWhole(const std::vector<CauseTerm>& terms, TorqueFault* gain) const;
   void Weigh(const VectorXd& left);
-  /// Makes R_, with as many rows as there are independent ones.
-  void Compress();
   /// Number of those rows that belong to columns of every explanation.
   [[nodiscard]] Eigen::Index CountForcedRows() const;
   [[nodiscard]] CauseSelection SelectAmong() const;
   [[nodiscard]] CauseSelection SelectAmong(const std::vector<bool>& excluded) const;
-  [[nodiscard]] std::vector<Eigen::Index> ListFirstColumns() const;
   /// One stretch of time has one push, a joint one shape of its dry friction, a link one mass, and some
   /// recording no payload: others would share the force.
   bool ExcludeSeconds();
@@ -114,7 +109,7 @@ class TorqueEstimator {
   std::vector<bool> excluded_;  // of these
   TorqueRows rows_;
   double block_size_ = 1.0, floor_ = 1.0;  // CauseOptions'
-  MatrixXd R_;                             // with the products of rows_
+  MatrixXd R_;  // with the products of rows_, and as many rows as there are independent ones
   CauseSelection selection_;
 };
 

@@ -16,12 +16,6 @@ Index CountColumns(const TorqueFault& fault) {
   return static_cast<Index>(fault.sums.size());
 }
 
-Index CountColumns(const std::vector<TorqueFault>& faults) {
-  Index count = 0;
-  for (const TorqueFault& fault : faults) count += CountColumns(fault);
-  return count;
-}
-
 Eigen::SparseMatrix<double> MapColumns(const TorqueBalance& balance, size_t place, size_t recording,
                                        const std::vector<TorqueFault>& faults) {
   const int joint = balance.joints()[place];
@@ -178,7 +172,12 @@ MatrixXd TorqueRows::CalcProducts() const {
 TorqueRows MakeTorqueRows(const RecordingSet& recordings, const std::vector<TorqueFault>& faults,
                           bool is_held) {
   TorqueRows all;
-  all.columns = CountForced(recordings) + CountColumns(faults) + 1;
+  all.columns = CountForced(recordings);
+  for (const TorqueFault& fault : faults) {
+    all.first.push_back(all.columns);
+    all.columns += CountColumns(fault);
+  }
+  ++all.columns;
   Index height = 0;
   for (size_t r = 0; r < recordings.size(); ++r) {
     const TorqueBalance& balance = is_held ? *recordings[r].held : *recordings[r].fit;

@@ -27,6 +27,7 @@ struct TorqueRows {
   double samples = 0.0;
   /// Columns that are part of every explanation, then the faults', y last.
   Eigen::Index columns = 0;
+  std::vector<Eigen::Index> first;  ///< Of each fault.
 
   /// rows * a.
   [[nodiscard]] VectorXd Multiply(const VectorXd& a) const;
@@ -54,7 +55,5 @@ Eigen::RowVectorXd CalcPushColumns(const RecordingSet& recordings, const Push& p
 /// Columns of the errors of drives' gains, one for each joint where currents were recorded.
 Eigen::Index CountForced(const RecordingSet& recordings);
 Eigen::Index CountColumns(const TorqueFault& fault);
-/// Returns the number of columns of all of them.
-Eigen::Index CountColumns(const std::vector<TorqueFault>& faults);
 
 }  // namespace dexcheck
