@@ -13,14 +13,13 @@ namespace dexcheck {
 
 /// A fault with its size.
 struct Fault {
-  std::string fault;      ///< "torque gain".
-  std::string place;      ///< "motor r_elbow".
-  double value = 0.0;     ///< With the fault; of a vector its length.
-  double error = 0.0;     ///< Standard error.
-  std::string unit;       ///< Empty for a factor.
-  std::string detail;     ///< Its direction, or what else belongs to it; empty for nothing.
-  double nominal = 0.0;   ///< The value without it.
-  VectorXd numbers = {};  ///< Amplitudes of a force's fault that has several; empty otherwise.
+  std::string fault;     ///< "torque gain".
+  std::string place;     ///< "motor r_elbow".
+  double value = 0.0;    ///< With the fault; of a vector its length.
+  double error = 0.0;    ///< Standard error.
+  std::string unit;      ///< Empty for a factor.
+  std::string detail;    ///< Its direction, or what else belongs to it; empty for nothing.
+  double nominal = 0.0;  ///< The value without it.
 
   /// Returns whether it is the same kind at the same place.
   [[nodiscard]] bool IsLike(const Fault& other) const { return fault == other.fault && place == other.place; }

@@ -36,7 +36,6 @@ Fault MakeGrowing(const Candidate& candidate, const VectorXd& a, const VectorXd&
               error.size() > 0 ? error.head(size).norm() : 0.0,
               candidate.unit,
               size == 1 ? "" : ShowVector(rate) + " "};
-  if (size > 1) fault.numbers = rate;
   RequireSize(&fault);
   fault.detail += "since " + FormatNumber(CalcGrowthBegin(a, candidate.nominal), 4) + " s";
   return fault;
@@ -82,7 +81,6 @@ Fault MakeForceFault(const Candidate& candidate, const VectorXd& amplitude, cons
               candidate.nominal + a[0], error.size() > 0 ? error[0] : 0.0,
               candidate.unit,           "",
               candidate.nominal};
-  if (a.size() > 1) fault.numbers = a;
   const bool sticks = candidate.fault == kStuckBearing;
   if (sticks || candidate.fault == kBearing) {
     fault.fault = "dry friction";

@@ -38,16 +38,11 @@ CauseDescription::JointNumber CauseDescription::CalcNumber(int joint, TorqueColu
   JointNumber number;
   for (const CauseTerm& term : estimator_.selection().terms) {
     const TorqueFault& fault = estimator_.faults()[term.candidate];
-    if (fault.HasVelocity()) {
-      if (fault.index != joint || FindNumber(fault, fault.sums[0][0].column) != kind) continue;
-      number.change += term.amplitude[0];
-      number.variance += Square(term.error[0]);
-      ++number.terms;
-      continue;
-    }
     for (size_t k = 0; k < fault.sums.size(); ++k)
       for (const ColumnPart& part : fault.sums[k]) {
         if (part.joint != joint || FindNumber(fault, part.column) != kind) continue;
+        // Its velocity is no number of the joint.
+        if (fault.HasVelocity() && &part != fault.sums.front().data()) continue;
         // A gain has what it multiplies beside its own column.
         const double factor = fault.kind == TorqueFault::kTorqueGain ? part.factor : 1.0;
         number.change += factor * term.amplitude[static_cast<Index>(k)];
@@ -160,11 +155,8 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
     one.detail = "moved by " + vector(R.transpose() * a) + InFrameOf(fault.index);
   } else if (fault.kind == kInertia) {
     const Matrix3d R = frames_.Find(fault.index).linear();
-    TorqueRegressor::BodyVector change = TorqueRegressor::BodyVector::Zero();
-    change.tail<6>() = a;
-    const Matrix3d I = R.transpose() * TorqueRegressor::Unpack(change).inertia * R;
-    change = TorqueRegressor::Pack({0.0, Vector3d::Zero(), I});
-    one.detail = "more by " + vector(change.tail<6>()) + " (xx, yy, zz, xy, xz, yz)" + InFrameOf(fault.index);
+    one.detail = "more by " + vector(ToEntries(R.transpose() * ToTensor(a) * R)) +
+                 " (xx, yy, zz, xy, xz, yz)" + InFrameOf(fault.index);
   } else if (fault.kind == kSaturation) {
     one.value = LimitOf(fault, a);
     one.error = error[1] * one.value;

@@ -56,7 +56,13 @@ class FaultList {
         extents_(extents) {}
 
   std::vector<TorqueFault> Make() {
-    for (const int joint : joints_) AddJoint(joint);
+    for (const int joint : joints_) {
+      const bool turns = model_.joint(joint).type == JointType::kRevolute;
+      AddFriction(joint, turns, extents_.FindTorque(joint));
+      AddSpring(joint, turns);
+      AddDrive(joint, turns, extents_.FindTorque(joint));
+      AddPosition(joint, turns, extents_.FindTorque(joint));
+    }
     for (int joint = 0; joint < model_.num_joints() && model_.num_joints() <= kMostWithGeometry; ++joint)
       AddGeometry(joint);
     for (int link = 0; link < model_.num_joints(); ++link) AddLink(link);
@@ -89,13 +95,12 @@ class FaultList {
     one.sums = std::move(columns);
     return one;
   }
-  /// Adds a fault of one joint's row. @param is_positive whether its value cannot be negative. @param most
-  /// the largest value that is plausible.
+  /// Adds a fault of one joint's row. @param most the largest value that is plausible.
   TorqueFault& AddAtJoint(TorqueFault::Kind kind, int joint, const std::string& fault,
-                          const std::string& unit, TorqueColumn column, double nominal, bool is_positive,
-                          double most) {
-    TorqueFault& one = Add(kind, joint, fault, unit, {{{column, joint}}}, nominal);
-    if (is_positive) one.least = VectorXd::Constant(1, -nominal);
+                          const std::string& unit, TorqueColumn::Kind column, double most,
+                          double nominal = 0.0) {
+    TorqueFault& one = Add(kind, joint, fault, unit, {{{{column, joint}, joint}}}, nominal);
+    if (one.IsFriction() || kind == TorqueFault::kArmature) one.least = VectorXd::Constant(1, -nominal);
     one.most = VectorXd::Constant(1, most);
     return one;
   }
@@ -106,65 +111,66 @@ class FaultList {
   }
   [[nodiscard]] double FindMostViscous(int joint) const { return FindMostPer(joint, extents_.speed, kSlow); }
 
-  void AddJoint(int joint) {
-    const Joint& modelled = model_.joint(joint);
-    const bool turns = modelled.type == JointType::kRevolute;
-    const std::string torque = turns ? "N m" : "N";
-    const std::string rate = turns ? "N m s/rad" : "N s/m";
-    const double most = extents_.FindTorque(joint);
+  void AddFriction(int joint, bool turns, double most) {
     using enum TorqueFault::Kind;
-    AddAtJoint(kDryFriction, joint, "dry friction", torque, {TorqueColumn::kDry, joint},
-               modelled.dry_friction, true, most);
-    AddAtJoint(kViscousFriction, joint, "viscous friction", rate, {TorqueColumn::kViscous, joint},
-               modelled.damping, true, FindMostViscous(joint));
+    const std::string torque = turns ? "N m" : "N";
+    const double dry = model_.joint(joint).dry_friction;
+    AddAtJoint(kDryFriction, joint, "dry friction", torque, TorqueColumn::kDry, most, dry);
+    AddAtJoint(kViscousFriction, joint, "viscous friction", turns ? "N m s/rad" : "N s/m",
+               TorqueColumn::kViscous, FindMostViscous(joint), model_.joint(joint).damping);
     AddAtJoint(kSquareFriction, joint, "friction that grows with the square of the velocity",
-               turns ? "N m s^2/rad^2" : "N s^2/m^2", {TorqueColumn::kSquare, joint}, 0.0, true,
+               turns ? "N m s^2/rad^2" : "N s^2/m^2", TorqueColumn::kSquare,
                FindMostPer(joint, extents_.speed.cwiseAbs2(), kSlow * kSlow));
     const bool has_stribeck = refinements_.stribeck.contains(joint);
     const bool has_smooth = refinements_.smooth.contains(joint);
     if (has_stribeck) AddKnownShape(kStribeckFriction, joint, "Stribeck friction", torque, 0.0);
-    if (has_smooth) AddKnownShape(kDryFriction, joint, "dry friction", torque, modelled.dry_friction);
+    if (has_smooth) AddKnownShape(kDryFriction, joint, "dry friction", torque, dry);
     for (int shape = 0; shape < kFrictionShapes; ++shape) {
       const bool is_stribeck = shape > kSmoothShapes;
       if (is_stribeck ? has_stribeck : has_smooth && shape != kSlipShape) continue;
-      AddAtJoint(is_stribeck ? kStribeckFriction : kDryFriction, joint,
-                 is_stribeck ? "Stribeck friction" : "dry friction", torque,
-                 {TorqueColumn::kFriction, joint, shape}, is_stribeck ? 0.0 : modelled.dry_friction, true,
-                 most)
-          .parameters = 1;
+      TorqueFault& one = AddAtJoint(is_stribeck ? kStribeckFriction : kDryFriction, joint,
+                                    is_stribeck ? "Stribeck friction" : "dry friction", torque,
+                                    TorqueColumn::kFriction, most, is_stribeck ? 0.0 : dry);
+      one.sums[0][0].column.component = shape;
+      one.parameters = 1;
     }
-    TorqueFault& spring = AddAtJoint(kSpring, joint, "spring", turns ? "N m/rad" : "N/m",
-                                     {TorqueColumn::kAngle, joint}, 0.0, true, kInfinite);
-    spring.sums.push_back({{{TorqueColumn::kOffset, joint}, joint}});
+  }
+
+  void AddSpring(int joint, bool turns) {
+    const Joint& modelled = model_.joint(joint);
+    TorqueFault& spring =
+        Add(TorqueFault::kSpring, joint, "spring", turns ? "N m/rad" : "N/m",
+            {{{{TorqueColumn::kAngle, joint}, joint}}, {{{TorqueColumn::kOffset, joint}, joint}}});
     constexpr double kNear = 0.01;  // rad or m
     spring.most = Vector2d(FindMostPer(joint, extents_.span, kNear), kInfinite);
     spring.scale = VectorXd::Constant(2, kMostTorque);
-    spring.least = Eigen::Vector2d(0.0, -kMostTorque);
+    spring.least = Vector2d(0.0, -kMostTorque);
     // A spring at rest further from the joint's range than its width is an offset that changes a little.
     const double middle = 0.5 * (modelled.lower + modelled.upper), width = modelled.upper - modelled.lower;
-    if (std::isfinite(width) && width > 0.0) {
+    if (std::isfinite(width) && width > 0.0)
       spring.is_possible = [middle, width](const VectorXd& a) {
         return std::abs(-a[1] / a[0] - middle) <= 1.5 * width;
       };
-    }
-    AddAtJoint(kLoadFriction, joint, "friction that grows with the load", "", {TorqueColumn::kLoad, joint},
-               0.0, true, 1.0);
-    AddAtJoint(kOffset, joint, "torque offset", torque, {TorqueColumn::kOffset, joint}, 0.0, false, most);
-    AddAtJoint(kDrift, joint, "torque drift", torque + "/s", {TorqueColumn::kTime, joint}, 0.0, false, most);
-    AddAtJoint(kDryDrift, joint, "dry friction that changes with time", torque + "/s",
-               {TorqueColumn::kDryTime, joint}, 0.0, false, most);
-    AddAtJoint(kArmature, joint, "armature", turns ? "kg m^2" : "kg", {TorqueColumn::kAcceleration, joint},
-               modelled.armature, true, FindMostPer(joint, extents_.acceleration, kSlow));
-    AddAtJoint(kTorqueGain, joint, "torque gain", "", {TorqueColumn::kTorque, joint}, 1.0, false, kMostGain)
-        .is_possible = IsGain;
+  }
+
+  void AddDrive(int joint, bool turns, double most) {
+    using enum TorqueFault::Kind;
+    const std::string torque = turns ? "N m" : "N";
+    AddAtJoint(kLoadFriction, joint, "friction that grows with the load", "", TorqueColumn::kLoad, 1.0);
+    AddAtJoint(kOffset, joint, "torque offset", torque, TorqueColumn::kOffset, most);
+    AddAtJoint(kDrift, joint, "torque drift", torque + "/s", TorqueColumn::kTime, most);
+    AddAtJoint(kDryDrift, joint, "dry friction that changes with time", torque + "/s", TorqueColumn::kDryTime,
+               most);
+    AddAtJoint(kArmature, joint, "armature", turns ? "kg m^2" : "kg", TorqueColumn::kAcceleration,
+               FindMostPer(joint, extents_.acceleration, kSlow), model_.joint(joint).armature);
+    AddAtJoint(kTorqueGain, joint, "torque gain", "", TorqueColumn::kTorque, kMostGain, 1.0).is_possible =
+        IsGain;
     TorqueFault& stuck =
         Add(kStuckTorque, joint, "stuck torque", torque,
             {{{{TorqueColumn::kOffset, joint}, joint}}, {{{TorqueColumn::kTorque, joint}, joint, -1.0}}});
-    stuck.is_possible = IsStuck;
-    TorqueFault& delay =
-        AddAtJoint(kDelay, joint, "delay of the torque", "s", {TorqueColumn::kRate, joint}, 0.0, false, 0.0);
-    delay.sums[0][0].factor = -1.0;
-    LimitDelay(&delay);
+    // The recorded torque has nothing of the model's.
+    stuck.is_possible = [](const VectorXd& a) { return std::abs(a[1] - 1.0) < 0.05; };
+    AddDelay(kDelay, joint, "delay of the torque", {{{TorqueColumn::kRate, joint}, joint, -1.0}});
     const int limits = refinements_.limits.contains(joint) ? 2 : kCutOffs;
     for (int k = 0; k < limits && recordings_ == 1; ++k) {
       const TorqueColumn beyond{TorqueColumn::kCutOff, joint, 2 * k},
@@ -175,28 +181,34 @@ class FaultList {
         return std::abs(a[0] - 1.0) < kWhole && std::abs(a[1]) < kWhole;
       };
     }
-    TorqueFault& backlash = Add(kBacklash, joint, "backlash", turns ? "rad" : "m",
-                                {{{{TorqueColumn::kBacklash, joint}, -1, -0.5}}});
-    backlash.is_possible = [](const VectorXd& a) { return a[0] > 0.0; };
-    backlash.most = VectorXd::Constant(1, turns ? 0.2 : 0.02);
-    TorqueFault& elastic = Add(kElasticity, joint, "elasticity", turns ? "rad/(N m)" : "m/N",
-                               {{{{TorqueColumn::kElastic, joint}, -1, -1.0}}});
-    elastic.is_possible = [](const VectorXd& a) { return a[0] > 0.0; };
-    elastic.most = VectorXd::Constant(1, (turns ? 0.2 : 0.02) / most);
-    Add(kZero, joint, "position offset", turns ? "rad" : "m",
-        {{{{TorqueColumn::kPosition, joint}, -1, -1.0}}})
-        .most = VectorXd::Constant(1, std::min(turns ? kPi : 1.0, width > 0.0 ? width : kInfinite));
-    TorqueFault& late =
-        Add(kLatePosition, joint, "delay of the position", "s", {{{{TorqueColumn::kLatePosition, joint}}}});
-    LimitDelay(&late);
-    constexpr double kMostOff = 0.3;
+  }
+
+  void AddPosition(int joint, bool turns, double most) {
+    using enum TorqueFault::Kind;
+    const std::string angle = turns ? "rad" : "m";
+    const double play = turns ? 0.2 : 0.02, range = model_.joint(joint).upper - model_.joint(joint).lower;
+    const auto is_positive = [](const VectorXd& a) { return a[0] > 0.0; };
+    const auto add = [&](TorqueFault::Kind kind, const char* fault, const std::string& unit,
+                         const ColumnPart& part, double largest) -> TorqueFault& {
+      TorqueFault& one = Add(kind, joint, fault, unit, {{part}});
+      one.most = VectorXd::Constant(1, largest);
+      return one;
+    };
+    add(kBacklash, "backlash", angle, {{TorqueColumn::kBacklash, joint}, -1, -0.5}, play).is_possible =
+        is_positive;
+    add(kElasticity, "elasticity", turns ? "rad/(N m)" : "m/N", {{TorqueColumn::kElastic, joint}, -1, -1.0},
+        play / most)
+        .is_possible = is_positive;
+    add(kZero, "position offset", angle, {{TorqueColumn::kPosition, joint}, -1, -1.0},
+        std::min(turns ? kPi : 1.0, range > 0.0 ? range : kInfinite));
+    AddDelay(kLatePosition, joint, "delay of the position", {{{TorqueColumn::kLatePosition, joint}}});
+    constexpr double kMostOff = 0.3, kMostError = 0.1;
     Add(kPositionGain, joint, "position gain", "", {{{{TorqueColumn::kPositionGain, joint}, -1, -1.0}}}, 1.0)
         .is_possible = IsNoLonger(kMostOff, VectorXd::Zero(1));
     for (const int harmonics : {2, kTurns}) {
       if (!turns) break;
       TorqueFault& turn = Add(kEccentricity, joint, "eccentric encoder", "rad", {});
       for (int k = 0; k < harmonics; ++k) turn.sums.push_back({{{TorqueColumn::kTurn, joint, k}, -1, -1.0}});
-      constexpr double kMostError = 0.1;
       turn.is_possible = IsNoLonger(kMostError, VectorXd::Zero(harmonics));
       turn.is_ordinary = harmonics == 2;
     }
@@ -319,7 +331,7 @@ class FaultList {
       AddInAll(kAllFriction, "dry and viscous friction", {TorqueColumn::kDry, TorqueColumn::kViscous});
       AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).is_possible = nullptr;
       faults_.back().scale = VectorXd::Constant(static_cast<Eigen::Index>(joints_.size()), kMostTorque);
-      LimitDelay(&Add(kDelay, -1, "delay of the torques", "s", {delay}));
+      AddDelay(kDelay, -1, "delay of the torques", delay);
       TorqueFault& all = Add(kTorqueGain, -1, "torque gain", "", {gain}, 1.0);
       all.is_possible = IsGain;
       all.most = VectorXd::Constant(1, kMostGain);
@@ -358,17 +370,13 @@ class FaultList {
     constexpr double kLeast = 5e-4;
     return std::abs(1.0 + a[0]) > kLeast;
   }
-  /// Whether the recorded torque has nothing of the model's.
-  static bool IsStuck(const VectorXd& a) {
-    constexpr double kWhole = 0.05;
-    return std::abs(a[1] - 1.0) < kWhole;
-  }
   /// No torque is recorded before it acts.
-  void LimitDelay(TorqueFault* delay) const {
+  void AddDelay(TorqueFault::Kind kind, int joint, const char* fault, const Parts& parts) {
+    TorqueFault& delay = Add(kind, joint, fault, "s", {parts});
     constexpr double kUsual = 0.05, kLatest = 0.5;  // s
-    delay->scale = VectorXd::Constant(1, kUsual);
-    delay->least = VectorXd::Constant(1, -1.5 * extents_.step);
-    delay->most = VectorXd::Constant(1, kLatest);
+    delay.scale = VectorXd::Constant(1, kUsual);
+    delay.least = VectorXd::Constant(1, -1.5 * extents_.step);
+    delay.most = VectorXd::Constant(1, kLatest);
   }
 
   /// In every joint.
