@@ -139,8 +139,6 @@ class Judge {
         if (shape.kind == TorqueColumn::kFriction && shape.component != kSlipShape)
           known[fault.index] = RoundToPercent(description_.ShapeVelocityOf(fault, amplitude));
       }
-      if (const double turn = FindTurn(fault, amplitude); fault.kind == TorqueFault::kCentre && turn != 0.0)
-        next.offsets.try_emplace(fault.index, turn);
       if (fault.kind == TorqueFault::kSaturation)
         next.limits[fault.index] = description_.LimitOf(fault, amplitude);
       if (fault.kind == TorqueFault::kGravity && !result_.IsWhole()) next.gravity = amplitude;
@@ -149,17 +147,6 @@ class Judge {
           next.delays[joint] += std::lround(amplitude[0] / set_.step());
     }
     if (!result_.IsWhole() && next.shaking == 0.0) next.shaking = FindShaking(set_, estimator_.rows(), left);
-  }
-  /// Returns the position offset, rad, that moves a link's centre of mass like this about its joint; 0 for
-  /// none. To first order the two look the same, so that the next reading compares them at this size.
-  [[nodiscard]] double FindTurn(const TorqueFault& fault, const VectorXd& amplitude) const {
-    if (fault.kind != TorqueFault::kCentre || set_.model().joint(fault.index).type != JointType::kRevolute)
-      return 0.0;
-    constexpr double kSame = 0.1;
-    const Vector3d com = set_.model().joint(fault.index).body.com;
-    const Vector2d before = com.head<2>(), after = (com + amplitude).head<2>();
-    if (std::abs(after.norm() - before.norm()) > kSame * before.norm()) return 0.0;
-    return std::atan2(after.x() * before.y() - after.y() * before.x(), after.dot(before));
   }
   /// Root mean square of the measured torque: of y, the model's torque and friction.
   double CalcMeasured(const TorqueRows::Part& part) const {

@@ -20,7 +20,6 @@ class Samples {
     MotionFit motion(model, recording, kRows);
     joints_ = motion.joints();
     has_currents_ = motion.has_currents();
-    recording_faults_ = motion.faults();
     size_t every = 1, count = 0;
     motion.Run([&](const RecordedSample& sample) {
       if (count++ % every != 0) return true;
@@ -42,14 +41,6 @@ class Samples {
   }
 
   [[nodiscard]] size_t size() const { return samples_.size(); }
-  /// Whether recorded velocities are the derivatives of positions that have this gain undone.
-  [[nodiscard]] bool HasRatesOf(const Fault& gain) const {
-    constexpr double kNear = 0.1;
-    return std::ranges::any_of(recording_faults_, [&](const Fault& rate) {
-      return rate.fault == "velocity gain" && rate.place == gain.place &&
-             std::abs(rate.value * gain.value - 1.0) < kNear;
-    });
-  }
   /// Lowest and highest positions (n x 2).
   [[nodiscard]] MatrixXd CalcRanges() const {
     MatrixXd ranges = MatrixXd::Zero(model_.num_joints(), 2);
@@ -58,9 +49,6 @@ class Samples {
       ranges << ranges.col(0).cwiseMin(sample.q), ranges.col(1).cwiseMax(sample.q);
     return ranges;
   }
-  [[nodiscard]] bool has_currents() const { return has_currents_; }
-  /// Takes the model's friction, and no offset, for the drives' from now on.
-  void TrustDrives() { trusts_drives_ = true; }
   /// Returns what friction, an offset and a current's scale leave of each joint's torque beside the model's
   /// (samples x joints), at every such sample; 0 where it is not judged.
   MatrixXd CalcResiduals(const NonlinearFault& undone, size_t every) {
@@ -86,15 +74,11 @@ class Samples {
         if (std::isnan(sample.torque[joint])) continue;
         // A current's scale is free.
         measured(i, place) = sample.torque[joint] - (has_currents_ ? 0.0 : torques[joint]);
-        const Joint& modelled = model_.joint(joint);
-        if (trusts_drives_)
-          measured(i, place) -=
-              modelled.damping * sample.qd[joint] + modelled.dry_friction * sample.direction[joint];
         columns[static_cast<size_t>(place)].row(i) << 1.0, sample.direction[joint], sample.qd[joint],
             has_currents_ ? torques[joint] : 0.0;
       }
     }
-    for (Index place = 0; place < joints && !trusts_drives_; ++place) {
+    for (Index place = 0; place < joints; ++place) {
       const MatrixXd& Z = columns[static_cast<size_t>(place)];
       auto y = measured.col(place);
       y -= (Z * SolveLeastSquares(Z.transpose() * Z, Z.transpose() * y)).eval();
@@ -107,8 +91,7 @@ class Samples {
 
   const RobotModel& model_;
   std::vector<int> joints_;
-  bool has_currents_ = false, trusts_drives_ = false;
-  std::vector<Fault> recording_faults_;
+  bool has_currents_ = false;
   std::vector<RecordedSample> samples_;
 };
 
@@ -314,16 +297,6 @@ std::optional<NonlinearFault> FindNonlinearFault(const RobotModel& model, Record
     const double most = as_read - (fault.number != Number::kNone ? kMuchOfNumber : kMuch);
     if (misfit < std::min(best, most) && IsPlausible(fault)) best = misfit, found = std::move(fault);
   }
-  // Torques that friction and an offset would take away may show the numbers better.
-  if (found && found->number != Number::kNone && !samples.has_currents()) {
-    NonlinearFault other = *found;
-    samples.TrustDrives();
-    constexpr double kLittle = 0.05;
-    const double misfit = Refine(model, 1, kWell, &samples, &other);
-    if (misfit < best + kLittle * static_cast<double>(model.num_joints()) && IsPlausible(other))
-      found = std::move(other);
-  }
-  if (found && found->factor != 1.0 && samples.HasRatesOf(found->fault)) found->has_right_rates = true;
   return found;
 }
 

@@ -200,32 +200,14 @@ Index TorqueEstimator::CountForcedRows() const {
 }
 
 CauseSelection TorqueEstimator::SelectAmong() const {
-  CauseSelection best = SelectAmong(excluded_);
-  // A fault in all joints goes before several single ones, of which the first alone explains less.
-  std::vector<bool> excluded = excluded_;
-  for (const CauseTerm& term : best.terms)
-    if (faults_[term.candidate].index < 0 && faults_[term.candidate].sums.size() > 3)
-      excluded[term.candidate] = true;
-  constexpr size_t kFew = 4;
-  if (excluded == excluded_ || best.terms.size() > kFew) return best;
-  CauseSelection other = SelectAmong(excluded);
-  return other.criterion < best.criterion ? other : best;
-}
-
-CauseSelection TorqueEstimator::SelectAmong(const std::vector<bool>& excluded) const {
   const Index width = R_.cols();
   const Index begin = CountForcedRows(), rows = R_.rows() - begin;
   std::vector<Candidate> candidates(faults_.begin(), faults_.end());
   for (size_t i = 0; i < faults_.size(); ++i) {
     candidates[i].columns = R_.block(begin, rows_.first[i], rows, CountColumns(faults_[i]));
-    if (excluded[i]) candidates[i].columns.setZero();
+    if (excluded_[i]) candidates[i].columns.setZero();
   }
   CauseOptions options;
-  for (size_t i = 0; i < faults_.size(); ++i) {
-    const TorqueFault& fault = faults_[i];
-    if (fault.parameters > 0 || excluded[i]) continue;
-    if (IsPart(fault, Part::kUsual) || fault.kind == TorqueFault::kArmature) options.start.push_back(i);
-  }
   options.most_terms = most_causes_;
   options.restarts = 0;
   options.exchanges_pairs = false;

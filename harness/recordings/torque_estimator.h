@@ -83,7 +83,6 @@ class TorqueEstimator {
   /// Number of those rows that belong to columns of every explanation.
   [[nodiscard]] Eigen::Index CountForcedRows() const;
   [[nodiscard]] CauseSelection SelectAmong() const;
-  [[nodiscard]] CauseSelection SelectAmong(const std::vector<bool>& excluded) const;
   /// One stretch of time has one push, a joint one shape of its dry friction, a link one mass, and some
   /// recording no payload: others would share the force.
   bool ExcludeSeconds();
