@@ -14,22 +14,6 @@ namespace {
 
 using Eigen::Index;
 
-/// A push does not hide behind what it adds to its joint's noise.
-VectorXd InUnitsOfMedian(const VectorXd& squares) {
-  const double usual = Median({squares.begin(), squares.end()});
-  return usual > 0.0 ? VectorXd(squares / usual) : squares;
-}
-
-/// A stretch that stands out, without what smoothing makes of its begin and end.
-Push TrimWindow(const VectorXd& squares, Index first, Index last,
-                const std::vector<TorqueBalance::Block>& blocks) {
-  const double whole = Median({squares.begin() + first, squares.begin() + last + 1});
-  constexpr double kNearlyWhole = 0.25;  // half of it
-  while (first < last && squares[first] < kNearlyWhole * whole) ++first;
-  while (last > first && squares[last] < kNearlyWhole * whole) --last;
-  return {.from = blocks[static_cast<size_t>(first)].from, .to = blocks[static_cast<size_t>(last)].to};
-}
-
 /// The few stretches that stand out most.
 std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueBalance::Block>& blocks) {
   constexpr size_t kMost = 3;
@@ -47,7 +31,8 @@ std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueB
     while (stays(first - 1) || stays(first - 2)) --first;
     while (stays(last + 1) || stays(last + 2)) ++last;
     // A residual that stands out half of the time is no push.
-    const Push push = TrimWindow(squares, first, last, blocks);
+    const Push push{.from = blocks[static_cast<size_t>(first)].from,
+                    .to = blocks[static_cast<size_t>(last)].to};
     // Windows of smoothing overlap, so that what acts shows in more than one sample.
     if (last - first <= squares.size() / 2 && push.from < push.to) windows.push_back(push);
     rest.segment(first, last - first + 1).setZero();
@@ -161,7 +146,7 @@ std::vector<Push> FindPushes(const RecordingSet& recordings, const TorqueRows& r
   VectorXd squares = VectorXd::Zero(static_cast<Index>(blocks.size()));
   for (const TorqueRows::Part& part : rows.parts)
     if (part.recording == recording)
-      squares += InUnitsOfMedian(left.segment(part.begin + part.within, part.size - part.within).cwiseAbs2());
+      squares += left.segment(part.begin + part.within, part.size - part.within).cwiseAbs2();
   std::vector<Push> pushes = FindWindows(squares, blocks);
   if (const std::optional<double> when = FindStep(recordings, rows, left, recording))
     pushes.push_back({.from = *when, .to = blocks.back().to});

@@ -23,12 +23,6 @@ constexpr double kFar = 5.0;
 /// Fraction of the residual that a cause must explain to justify another reading.
 constexpr double kMuch = 0.05;
 
-/// Velocities that are read again need no more digits: a reading knows how friction changes with them.
-double RoundToPercent(double velocity) {
-  constexpr double kSteps = 100.0;  // of a percent, in the logarithm
-  return std::exp(std::round(kSteps * std::log(velocity)) / kSteps);
-}
-
 /// One judgement, put into words.
 class Judge {
  public:
@@ -137,7 +131,7 @@ class Judge {
         const TorqueColumn& shape = fault.sums.front().front().column;
         auto& known = fault.kind == TorqueFault::kDryFriction ? next.smooth : next.stribeck;
         if (shape.kind == TorqueColumn::kFriction && shape.component != kSlipShape)
-          known[fault.index] = RoundToPercent(description_.ShapeVelocityOf(fault, amplitude));
+          known[fault.index] = description_.ShapeVelocityOf(fault, amplitude);
       }
       if (fault.kind == TorqueFault::kSaturation)
         next.limits[fault.index] = description_.LimitOf(fault, amplitude);

@@ -137,7 +137,6 @@ class FaultList {
   }
 
   void AddSpring(int joint, bool turns) {
-    const Joint& modelled = model_.joint(joint);
     TorqueFault& spring =
         Add(TorqueFault::kSpring, joint, "spring", turns ? "N m/rad" : "N/m",
             {{{{TorqueColumn::kAngle, joint}, joint}}, {{{TorqueColumn::kOffset, joint}, joint}}});
@@ -145,12 +144,6 @@ class FaultList {
     spring.most = Vector2d(FindMostPer(joint, extents_.span, kNear), kInfinite);
     spring.scale = VectorXd::Constant(2, kMostTorque);
     spring.least = Vector2d(0.0, -kMostTorque);
-    // A spring at rest further from the joint's range than its width is an offset that changes a little.
-    const double middle = 0.5 * (modelled.lower + modelled.upper), width = modelled.upper - modelled.lower;
-    if (std::isfinite(width) && width > 0.0)
-      spring.is_possible = [middle, width](const VectorXd& a) {
-        return std::abs(-a[1] / a[0] - middle) <= 1.5 * width;
-      };
   }
 
   void AddDrive(int joint, bool turns, double most) {
@@ -273,13 +266,7 @@ class FaultList {
       inertia.is_possible = [vector, is_real = IsBody(vector)](const VectorXd& a) {
         BodyVector changed = vector;
         changed.tail<6>() += a;
-        if (!is_real || IsBody(changed)) return true;
-        // Moments that the motion does not show may be larger as well.
-        constexpr double kUnseen = 1e-6;
-        const double most = a.head<3>().maxCoeff();
-        for (int k = 0; k < 3 && most > 0.0; ++k)
-          if (std::abs(a[k]) < kUnseen * most) changed[4 + k] += most;
-        return IsBody(changed);
+        return !is_real || IsBody(changed);
       };
     }
     AddPayload(link);
@@ -326,8 +313,7 @@ class FaultList {
       gain.push_back({{TorqueColumn::kTorque, joint}, joint, 1.0});
     }
     if (joints_.size() > 1) {
-      for (const auto shape : {TorqueColumn::kDry, TorqueColumn::kFriction})
-        AddInAll(kAllDry, "dry friction", {shape}).parameters = shape == TorqueColumn::kDry ? 0 : 1;
+      AddInAll(kAllDry, "dry friction", {TorqueColumn::kDry});
       AddInAll(kAllFriction, "dry and viscous friction", {TorqueColumn::kDry, TorqueColumn::kViscous});
       AddInAll(kAllOffsets, "torque offset", {TorqueColumn::kOffset}).is_possible = nullptr;
       faults_.back().scale = VectorXd::Constant(static_cast<Eigen::Index>(joints_.size()), kMostTorque);

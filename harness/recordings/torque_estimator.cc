@@ -62,7 +62,6 @@ TorqueEstimator::TorqueEstimator(RecordingSet* recordings, size_t most_causes)
     Select();
   }
   while (ExcludeSeconds()) Select();
-  ExcludeUnseen();
   WidenErrors();
 }
 
@@ -92,22 +91,12 @@ void TorqueEstimator::ListFaults() {
             (one.kind == TorqueFault::kTorqueGain || one.kind == TorqueFault::kSaturation ||
              one.kind == TorqueFault::kStuckTorque)) ||
            ((*recordings_)[0].motion.stands &&
-            (one.kind == TorqueFault::kSaturation || one.kind == TorqueFault::kStuckTorque)) ||
-           IsTooFast(one);
+            (one.kind == TorqueFault::kSaturation || one.kind == TorqueFault::kStuckTorque));
   });
   excluded_.clear();
   // With drives' gains sought, the model's bodies are the scale that shows them.
   for (const TorqueFault& one : faults_)
     excluded_.push_back(recordings_->has_currents() && one.IsOfLoad() && one.kind != TorqueFault::kPayload);
-}
-
-bool TorqueEstimator::IsTooFast(const TorqueFault& fault) const {
-  if (fault.kind != TorqueFault::kStribeckFriction) return false;
-  constexpr double kRows = 8.0, kPeak = 3.0;  // MotionExtents' are peaks
-  const double step = recordings_->CalcExtents().acceleration[fault.index] / kPeak * recordings_->step();
-  const ReadRecording& first = (*recordings_)[0];
-  return first.motion.shape_velocities(fault.index, fault.sums.front().front().column.component) <
-         kRows * step;
 }
 
 void TorqueEstimator::Select() {
@@ -153,8 +142,7 @@ void TorqueEstimator::Relinearise() {
     const VectorXd y = R_.rightCols<1>() - R_.leftCols(others.size()) * others;
     for (size_t i = 0; i < faults_.size(); ++i) {
       const bool is_same = std::ranges::any_of(term.same, [&](const auto& one) { return one.first == i; });
-      if ((faults_[i].index != found.index || faults_[i].recording != found.recording) && !is_same) continue;
-      if (is_found[i] && i != term.candidate) continue;
+      if (i != term.candidate && (!is_same || is_found[i])) continue;
       if (faults_[i].kind == TorqueFault::kCentre || faults_[i].kind == TorqueFault::kPayload)
         PlaceMass(recordings_->model(),
                   SolveLeastSquares(R_.middleCols(rows_.first[i], CountColumns(faults_[i])), y, kIndependent),
@@ -262,18 +250,6 @@ bool TorqueEstimator::ExcludeSeconds() {
     }
   }
   return has_any;
-}
-
-void TorqueEstimator::ExcludeUnseen() {
-  if (!IsNoise(CalcLeft({}))) return;
-  constexpr int kTimes = 3;
-  for (int i = 0; i < kTimes; ++i) {
-    bool has_any = false;
-    for (const CauseTerm& term : selection_.terms)
-      if (!term.error.array().isFinite().all()) excluded_[term.candidate] = has_any = true;
-    if (!has_any) return;
-    Select();
-  }
 }
 
 double TorqueEstimator::CalcHidden(double noise, double left, double samples) const {

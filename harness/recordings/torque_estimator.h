@@ -69,9 +69,6 @@ class TorqueEstimator {
 
  private:
   void ListFaults();
-  /// Stribeck friction through whose velocity the joint passes within a few rows: how a joint turns looks
-  /// like it.
-  [[nodiscard]] bool IsTooFast(const TorqueFault& fault) const;
   /// Errors are no less than those by which stretches of time, or joints, disagree.
   void WidenErrors();
   void Select();
@@ -86,8 +83,6 @@ class TorqueEstimator {
   /// One stretch of time has one push, a joint one shape of its dry friction, a link one mass, and some
   /// recording no payload: others would share the force.
   bool ExcludeSeconds();
-  /// Leaves out causes whose size the motion does not show where the model alone leaves no more than noise.
-  void ExcludeUnseen();
   [[nodiscard]] static bool IsPart(const TorqueFault& fault, Part part);
   /// Returns the residual of that fit.
   [[nodiscard]] VectorXd Fit(Part part) const;
