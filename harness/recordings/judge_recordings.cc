@@ -258,8 +258,8 @@ class Judge {
 
   /// Whether more than noise is left, so that something else is at work, and all causes or this one explain
   /// little, or where far more is left not far more: a wrong mass fits a little of any. Dry and viscous
-  /// friction are named all the same, since drives have more shapes of it than are tried, unless a doubtful
-  /// cause explains more; a further shape that explains little is not.
+  /// friction are named all the same, since drives have more shapes of it than are tried; a further shape
+  /// that explains little is not.
   [[nodiscard]] bool IsDoubtful(const TorqueFault& fault, const CauseTerm& term) const {
     constexpr double kErrors = 3.0;  // standard errors from zero
     const VectorXd shown = term.error.array().isFinite().select(term.error, 0.0);
@@ -278,16 +278,12 @@ class Judge {
     constexpr double kMostLeft = 0.1;
     // A force on a link for a while fits a part of anything that is large then.
     if (fault.kind == TorqueFault::kPush && fault.push.joint < 0) return true;
-    // Friction is no name for a remainder of another cause, nor for a residual that one explains as well.
+    // Friction is no name for a remainder of another cause.
     const bool is_nearest = !has_others_ && std::ranges::all_of(result_.found, [](const FoundFault& before) {
       return before.is_named && before.fault.IsFriction();
     });
-    constexpr double kAsMuch = 0.5;
-    const bool is_entangled = std::ranges::any_of(estimator_.selection().terms, [&](const CauseTerm& other) {
-      return !estimator_.faults()[other.candidate].IsFriction() && other.fraction > kAsMuch * term.fraction;
-    });
     if (fault.IsFriction())
-      return !is_nearest || is_entangled ||
+      return !is_nearest ||
              ((fault.kind == TorqueFault::kStribeckFriction || fault.kind == TorqueFault::kLoadFriction ||
                fault.kind == TorqueFault::kSquareFriction) &&
               term.fraction - left < kMuch);

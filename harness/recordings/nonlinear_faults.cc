@@ -194,7 +194,8 @@ void NonlinearFault::Undo(Recording* recording) const {
       continue;
     }
     const bool is_position = one.quantity == RecordedQuantity::kPosition;
-    const bool is_changed = IsTorque(one) ? is_torque : is_motion && IsMotion(one);
+    const bool is_changed =
+        IsTorque(one) ? is_torque : is_motion && IsMotion(one) && (is_position || !has_right_rates);
     if (!is_changed) continue;
     if (!order.empty()) {
       one.joint = order[static_cast<size_t>(one.joint)];

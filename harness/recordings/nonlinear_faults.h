@@ -24,6 +24,7 @@ struct NonlinearFault {
   std::vector<int> order = {};        ///< The joint that each joint's columns are of; empty for its own.
   bool is_motion = true;              ///< Positions, velocities and accelerations.
   bool is_torque = false;             ///< Torques or currents.
+  bool has_right_rates = false;       ///< Velocities are none of what is undone.
   bool shows_all = true;              ///< The motion determines every one of the numbers.
   /// Translation of the joint that undoes it, in its parent's frame, m.
   Vector3d shift = Vector3d::Zero();

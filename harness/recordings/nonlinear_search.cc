@@ -20,6 +20,7 @@ class Samples {
     MotionFit motion(model, recording, kRows);
     joints_ = motion.joints();
     has_currents_ = motion.has_currents();
+    recording_faults_ = motion.faults();
     size_t every = 1, count = 0;
     motion.Run([&](const RecordedSample& sample) {
       if (count++ % every != 0) return true;
@@ -41,6 +42,14 @@ class Samples {
   }
 
   [[nodiscard]] size_t size() const { return samples_.size(); }
+  /// Whether recorded velocities are the derivatives of positions that have this gain undone.
+  [[nodiscard]] bool HasRatesOf(const Fault& gain) const {
+    constexpr double kNear = 0.1;
+    return std::ranges::any_of(recording_faults_, [&](const Fault& rate) {
+      return rate.fault == "velocity gain" && rate.place == gain.place &&
+             std::abs(rate.value * gain.value - 1.0) < kNear;
+    });
+  }
   /// Lowest and highest positions (n x 2).
   [[nodiscard]] MatrixXd CalcRanges() const {
     MatrixXd ranges = MatrixXd::Zero(model_.num_joints(), 2);
@@ -92,6 +101,7 @@ class Samples {
   const RobotModel& model_;
   std::vector<int> joints_;
   bool has_currents_ = false;
+  std::vector<Fault> recording_faults_;
   std::vector<RecordedSample> samples_;
 };
 
@@ -297,6 +307,7 @@ std::optional<NonlinearFault> FindNonlinearFault(const RobotModel& model, Record
     const double most = as_read - (fault.number != Number::kNone ? kMuchOfNumber : kMuch);
     if (misfit < std::min(best, most) && IsPlausible(fault)) best = misfit, found = std::move(fault);
   }
+  if (found && found->factor != 1.0 && samples.HasRatesOf(found->fault)) found->has_right_rates = true;
   return found;
 }
 

@@ -120,21 +120,6 @@ void RecordingSet::ReportSecond(const ReadOptions& options, double time, const V
   second_samples_ = 0;
 }
 
-double RecordingSet::CalcTimeError(const ReadRecording& one) const {
-  // When a torque acted is known to a row's time. All joints of a row have one time: what a joint's torque is
-  // off, over how fast it changes, is at least the error of time, whatever else is wrong.
-  double error = one.motion.step / std::sqrt(12.0);
-  if (has_currents_ || joints_.size() < 2) return error;
-  constexpr double kAtMost = 8.0;  // positions, velocities and torques of a row may have times of their own
-  for (size_t place = 0; place < joints_.size(); ++place) {
-    const MatrixXd& G = one.fit->products(place);
-    const Index rate = one.fit->Find(place, {TorqueColumn::kRate, joints_[place]}), y = G.cols() - 1;
-    if (rate < 0 || !(G(rate, rate) > 0.0)) continue;
-    error = std::min(error, kAtMost * std::sqrt(std::max(0.0, G(y, y)) / G(rate, rate)));
-  }
-  return error;
-}
-
 double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
   const TorqueBalance& balance = *one.fit;
   const int joint = joints_[place];
@@ -158,7 +143,7 @@ double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
   if (one.motion.wrench.size() > 0)
     variance += balance.wrench_squares(place).dot(one.motion.wrench.cwiseAbs2()) / samples;
   variance += mean_square({TorqueColumn::kRate, joint}) *
-              Square(gains_[static_cast<Index>(place)] * CalcTimeError(one));
+              Square(gains_[static_cast<Index>(place)] * one.motion.step) / 12.0;
   // Polynomials leave 1e-6 of the torques of a simulated Panda, whose recording has no noise.
   constexpr double kExact = 1e-5;
   return std::sqrt(variance + Square(kExact) * mean_square({TorqueColumn::kTorque, joint}) +

@@ -90,9 +90,6 @@ class RecordingSet {
  private:
   void Read(Recording* recording, const ReadOptions& options, const std::function<bool(long rows)>& on_rows);
   void ReportSecond(const ReadOptions& options, double time, const VectorXd& residual);
-  /// Returns the standard deviation of a row's time, s: that of a uniform distribution over a row, or less
-  /// where the torques of a joint show that times are known better.
-  [[nodiscard]] double CalcTimeError(const ReadRecording& one) const;
   [[nodiscard]] double CalcNoise(const ReadRecording& one, size_t place) const;
   void MeasureNoise();
   /// From all recordings, with friction and an offset beside them.

@@ -137,6 +137,7 @@ class FaultList {
   }
 
   void AddSpring(int joint, bool turns) {
+    const Joint& modelled = model_.joint(joint);
     TorqueFault& spring =
         Add(TorqueFault::kSpring, joint, "spring", turns ? "N m/rad" : "N/m",
             {{{{TorqueColumn::kAngle, joint}, joint}}, {{{TorqueColumn::kOffset, joint}, joint}}});
@@ -144,6 +145,12 @@ class FaultList {
     spring.most = Vector2d(FindMostPer(joint, extents_.span, kNear), kInfinite);
     spring.scale = VectorXd::Constant(2, kMostTorque);
     spring.least = Vector2d(0.0, -kMostTorque);
+    // A spring at rest further from the joint's range than its width is an offset that changes a little.
+    const double middle = 0.5 * (modelled.lower + modelled.upper), width = modelled.upper - modelled.lower;
+    if (std::isfinite(width) && width > 0.0)
+      spring.is_possible = [middle, width](const VectorXd& a) {
+        return std::abs(-a[1] / a[0] - middle) <= 1.5 * width;
+      };
   }
 
   void AddDrive(int joint, bool turns, double most) {
