@@ -133,7 +133,8 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
   one.fault = fault.fault;
   one.place = fault.place;
   one.unit = fault.unit;
-  const bool is_number = a.size() == 1 || fault.kind == TorqueFault::kSpring || fault.HasVelocity();
+  const bool is_number =
+      (a.size() == 1 && fault.axes.size() == 0) || fault.kind == TorqueFault::kSpring || fault.HasVelocity();
   const bool is_of_joints = fault.index < 0 && fault.sums.size() > 1 && fault.sums.front().front().joint >= 0;
   one.value = is_number ? fault.nominal + a[0] : is_of_joints ? a.mean() : a.norm();
   // A combination that does not show leaves the others their size.
@@ -152,7 +153,9 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
     one.detail = "at " + vector(place) + " m" + InFrameOf(fault.index);
   } else if (fault.kind == kCentre) {
     const Matrix3d R = frames_.Find(fault.index).linear();
-    one.detail = "moved by " + vector(R.transpose() * a) + InFrameOf(fault.index);
+    one.detail = "moved by " + vector(R.transpose() * fault.axes * a) + InFrameOf(fault.index);
+  } else if (fault.kind == kInertia && fault.IsEntry()) {
+    one.detail = "times the model's";
   } else if (fault.kind == kInertia) {
     const Matrix3d R = frames_.Find(fault.index).linear();
     one.detail = "more by " + vector(ToEntries(R.transpose() * ToTensor(a) * R)) +
@@ -161,8 +164,12 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
     one.value = LimitOf(fault, a);
     one.error = error[1] * one.value;
   } else if (fault.kind == kGeometry) {
-    one.detail = DescribeGeometry(
-        model_, frames_, GeometryFault(model_, fault.index, fault.sums.front().front().column.component, a));
+    const bool is_placement = fault.sums.front().front().column.component == 0;
+    NonlinearFault geometry{
+        .number = is_placement ? NonlinearFault::Number::kPlacement : NonlinearFault::Number::kOrientation,
+        .joint = fault.index};
+    (is_placement ? geometry.shift : geometry.turn) = fault.axes * a;
+    one.detail = DescribeGeometry(model_, frames_, geometry);
   } else if (fault.kind == kPositionGain) {
     one.value = 1.0 / (1.0 - a[0]);
     one.error *= Square(one.value);

@@ -25,7 +25,8 @@ std::vector<TorqueFault> ListDesignedFaults(const RobotModel& model, const std::
   std::vector<TorqueFault> faults = ListTorqueFaults(model, joints, 1);
   std::erase_if(faults, [](const TorqueFault& fault) {
     using enum TorqueFault::Kind;
-    const bool is_variant = fault.parameters > 0 || (fault.kind == kPayload && fault.sums.size() > 4);
+    const bool is_variant =
+        fault.parameters > 0 || fault.IsEntry() || (fault.kind == kPayload && fault.sums.size() > 4);
     const bool is_of_all = fault.index < 0 && fault.kind != kGravity;
     const bool is_left_out = fault.kind == kDelay || fault.kind == kLoadFriction || fault.kind == kDrift ||
                              fault.kind == kSquareFriction || fault.kind == kElasticity;

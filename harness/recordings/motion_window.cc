@@ -293,7 +293,9 @@ std::optional<Fault> MotionFit::CheckVelocity(int joint, const std::vector<size_
     b += v * rates;
     squares += v * v;
   }
-  if (!(G(0, 0) > kShows * noise(0, 0))) return std::nullopt;
+  constexpr double kStill = 1e-6;  // rad/s or m/s
+  if (!(G(0, 0) > kShows * noise(0, 0) + Square(kStill) * static_cast<double>(centres.size())))
+    return std::nullopt;
   const Eigen::Matrix2d right = G - noise;
   const double gain = b[0] / right(0, 0);
   const std::string place = "joint " + model_->joint(joint).name;

@@ -75,6 +75,7 @@ class RecordingSet {
   /// Returns the extents with which sizes of faults are compared.
   [[nodiscard]] MotionExtents CalcExtents() const;
   [[nodiscard]] const Refinements& refinements() const { return refinements_; }  ///< As given.
+  [[nodiscard]] const LinkFrames& frames() const { return frames_; }
   [[nodiscard]] double step() const { return step_; }  ///< The longest between rows, s.
   [[nodiscard]] long rows() const { return rows_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
@@ -102,6 +103,7 @@ class RecordingSet {
   bool has_currents_ = false;
   double step_ = 0.0;
   Refinements refinements_;
+  LinkFrames frames_;
   VectorXd gains_, first_gains_;  // by place
   long rows_ = 0;
   std::vector<std::string> notes_;

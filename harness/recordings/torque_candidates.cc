@@ -48,12 +48,13 @@ BodyVector CentreColumn(const MassProperties& body, int k) {
 class FaultList {
  public:
   FaultList(const RobotModel& model, const std::vector<int>& joints, int recordings,
-            const Refinements& refinements, const MotionExtents& extents)
+            const Refinements& refinements, const MotionExtents& extents, const LinkFrames& frames)
       : model_(model),
         joints_(joints),
         recordings_(recordings),
         refinements_(refinements),
-        extents_(extents) {}
+        extents_(extents),
+        frames_(frames) {}
 
   std::vector<TorqueFault> Make() {
     for (const int joint : joints_) {
@@ -214,20 +215,38 @@ class FaultList {
     }
   }
 
-  /// All that a fixed base carries turns with gravity.
+  /// Adds a joint that stands elsewhere. All that a fixed base carries turns with gravity.
   void AddGeometry(int joint) {
-    const auto add = [&](const std::string& fault, const std::string& unit, int first, int count,
+    const MatrixXd directions = FindDirections(model_, joint);
+    const auto add = [&](const std::string& fault, const std::string& unit, int first, const MatrixXd& axes,
                          double most) {
       TorqueFault& one = Add(TorqueFault::kGeometry, joint, fault, unit, {});
-      for (int k = first; k < first + count; ++k) one.sums.push_back({{{TorqueColumn::kGeometry, joint, k}}});
-      one.is_possible = IsNoLonger(most, VectorXd::Zero(count));
+      one.axes = axes;
+      for (const auto& axis : axes.colwise()) {
+        Parts& parts = one.sums.emplace_back();
+        const Vector3d along = first == 0 ? Vector3d(axis) : Vector3d(directions.transpose() * axis);
+        for (int k = 0; k < (first == 0 ? 3 : 2); ++k)
+          parts.push_back({{TorqueColumn::kGeometry, joint, first + k}, -1, along[k]});
+        // A turn about the joint's own axis is an offset of its position.
+        if (first > 0) parts.push_back({{TorqueColumn::kPosition, joint}, -1, along[2]});
+      }
+      one.is_possible = IsNoLonger(most, VectorXd::Zero(axes.cols()));
     };
     // Larger displacements are not in proportion.
     constexpr double kFarthest = 0.05, kMostTurn = 0.15;  // m, rad
-    add("axis", "rad", 5, 2, kMostTurn);
-    if (model_.joint(joint).parent < 0) return;
-    add("placement", "m", 0, 3, kFarthest);
-    add("orientation", "rad", 3, 2, kMostTurn);
+    add("axis", "rad", 5, directions.leftCols(2), kMostTurn);
+    const int parent = model_.joint(joint).parent;
+    if (parent < 0) return;
+    add("placement", "m", 0, Matrix3d::Identity(), kFarthest);
+    add("orientation", "rad", 3, directions.leftCols(2), kMostTurn);
+    // The numbers of a file are wrong one by one.
+    const Matrix3d R = frames_.Find(parent).linear();
+    constexpr double kAlong = 0.99;
+    for (int k = 0; k < 3; ++k) {
+      add("placement", "m", 0, R.col(k), kFarthest);
+      if (std::abs(directions.col(2).dot(R.col(k))) < kAlong)
+        add("orientation", "rad", 3, R.col(k), kMostTurn);
+    }
   }
 
   /// Adds friction whose velocity is roughly known: the shape there, and what the logarithm of the velocity
@@ -255,16 +274,25 @@ class FaultList {
       // With the inertia of its shape, or at its centre.
       for (const BodyVector& change :
            {BodyVector(vector / body.mass), TorqueRegressor::Pack({1.0, body.com})}) {
-        constexpr double kMostTimes = 10.0;
         Add(kMass, link, "mass", "kg", {BodyParts(link, change)}, body.mass).is_possible =
             [m = body.mass](const VectorXd& a) { return m + a[0] > 0.0 && m + a[0] < kMostTimes * m; };
       }
-      TorqueFault& centre = Add(kCentre, link, "centre of mass", "m", std::vector<Parts>(3));
-      PlaceMass(model_, Vector3d::Zero(), &centre);
-      constexpr double kLength = 0.05, kFarthest = 0.15;
-      centre.scale = VectorXd::Constant(3, kLength);
-      centre.is_possible = [](const VectorXd& a) { return a.norm() < kFarthest; };
-      centre.is_ordinary = true;
+      const Matrix3d R = frames_.Find(link).linear();
+      for (const MatrixXd& axes :
+           {MatrixXd(Matrix3d::Identity()), MatrixXd(R.col(0)), MatrixXd(R.col(1)), MatrixXd(R.col(2))}) {
+        TorqueFault& centre =
+            Add(kCentre, link, "centre of mass", "m", std::vector<Parts>(static_cast<size_t>(axes.cols())));
+        centre.axes = axes;
+        PlaceMass(model_, VectorXd::Zero(axes.cols()), &centre);
+        constexpr double kLength = 0.05, kFarthest = 0.15;
+        centre.scale = VectorXd::Constant(axes.cols(), kLength);
+        centre.is_possible = [](const VectorXd& a) { return a.norm() < kFarthest; };
+        centre.is_ordinary = axes.cols() == 3;
+      }
+      // All of it times a factor.
+      const BodyVector central = TorqueRegressor::Pack({0.0, Vector3d::Zero(), body.inertia});
+      Add(kInertia, link, "inertia", "", {BodyParts(link, central)}, 1.0).is_possible =
+          [](const VectorXd& a) { return a[0] > -1.0 && a[0] < kMostTimes; };
       TorqueFault& inertia = Add(kInertia, link, "inertia", "kg m^2", {});
       for (int k = 4; k < TorqueRegressor::kBody; ++k)
         inertia.sums.push_back(BodyParts(link, BodyVector::Unit(k)));
@@ -390,13 +418,15 @@ class FaultList {
   }
 
   static constexpr double kMostGain = 1100.0;
-  static constexpr double kSlow = 0.1;  // rad/s or rad/s^2, m/s or m/s^2
+  static constexpr double kMostTimes = 10.0;  // a body's mass or inertia
+  static constexpr double kSlow = 0.1;        // rad/s or rad/s^2, m/s or m/s^2
 
   const RobotModel& model_;
   const std::vector<int>& joints_;
   int recordings_;
   const Refinements& refinements_;
   const MotionExtents& extents_;
+  const LinkFrames& frames_;
   std::vector<TorqueFault> faults_;
 };
 
@@ -433,15 +463,18 @@ BodyVector FindNearestBody(const BodyVector& body) {
 
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
                                           int recordings, const Refinements& refinements,
-                                          const MotionExtents& extents) {
-  return FaultList(model, joints, recordings, refinements, extents).Make();
+                                          const MotionExtents& extents, const LinkFrames& frames) {
+  return FaultList(model, joints, recordings, refinements, extents, frames).Make();
 }
 
-static void ShiftCentre(const RobotModel& model, const Vector3d& shift, TorqueFault* centre) {
+static void ShiftCentre(const RobotModel& model, const VectorXd& amplitude, TorqueFault* centre) {
   MassProperties body = model.joint(centre->index).body;
-  body.com += 0.5 * shift;
-  for (int k = 0; k < 3; ++k)
-    centre->sums[static_cast<size_t>(k)] = BodyParts(centre->index, CentreColumn(body, k));
+  body.com += 0.5 * centre->axes * amplitude;
+  for (Eigen::Index k = 0; k < amplitude.size(); ++k) {
+    BodyVector change = BodyVector::Zero();
+    for (int i = 0; i < 3; ++i) change += centre->axes(i, k) * CentreColumn(body, i);
+    centre->sums[static_cast<size_t>(k)] = BodyParts(centre->index, change);
+  }
 }
 
 static void PlacePayload(double mass, const Vector3d& h, TorqueFault* payload) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "harness/diagnosis/cause_estimator.h"
+#include "harness/recordings/channels.h"
 #include "harness/recordings/torque_balance.h"
 
 namespace dexcheck {
@@ -78,7 +79,14 @@ struct TorqueFault : Candidate {
   /// The largest plausible size of each amplitude with its nominal value; empty where is_possible says all.
   VectorXd most = {};
   Push push = {};
+  /// Directions of the amplitudes of a centre of mass, in its link's frame, and of a geometry, in the frame
+  /// of the link that carries the joint (3 x p); none of others.
+  MatrixXd axes = {};
 
+  /// It is one number of a vector or tensor that another fault has whole.
+  [[nodiscard]] bool IsEntry() const {
+    return (kind == kGeometry || kind == kCentre || kind == kInertia) && sums.size() == 1;
+  }
   /// Friction of any shape, in one joint or in all.
   [[nodiscard]] bool IsFriction() const { return kind <= kLoadFriction; }
   /// Friction whose second amplitude is a change of its velocity's logarithm, times the first.
@@ -107,10 +115,11 @@ struct MotionExtents {
 };
 
 /// All that are tried of a model's recordings.
-/// @param joints that are judged. @param recordings their number.
+/// @param joints that are judged. @param recordings their number. @param frames along whose axes a joint may
+/// be misplaced.
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
                                           int recordings, const Refinements& refinements = {},
-                                          const MotionExtents& extents = {});
+                                          const MotionExtents& extents = {}, const LinkFrames& frames = {});
 
 /// Gives a centre of mass, or a payload that is a point, the columns with which these amplitudes, if they can
 /// be, leave what they leave: inertias about the link's origin grow with the square of a distance.

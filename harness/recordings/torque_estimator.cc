@@ -84,7 +84,7 @@ void TorqueEstimator::ListFaults() {
   if (judged.empty())
     throw InputError("the recordings determine no joint's drive gain: nothing can be judged");
   faults_ = ListTorqueFaults(recordings_->model(), judged, static_cast<int>(recordings_->size()),
-                             recordings_->refinements(), recordings_->CalcExtents());
+                             recordings_->refinements(), recordings_->CalcExtents(), recordings_->frames());
   // Torques that hold a robot still reach no limit.
   std::erase_if(faults_, [&](const TorqueFault& one) {
     return (recordings_->has_currents() &&
@@ -238,11 +238,13 @@ bool TorqueEstimator::ExcludeSeconds() {
   std::vector<std::tuple<TorqueFault::Kind, int, int>> seen;
   for (const CauseTerm& term : selection_.terms) {
     const TorqueFault& one = faults_[term.candidate];
-    const bool is_shape = one.kind == TorqueFault::kDryFriction ||
-                          one.kind == TorqueFault::kStribeckFriction ||
-                          one.kind == TorqueFault::kSaturation || one.kind == TorqueFault::kMass;
+    const bool is_shape =
+        one.kind == TorqueFault::kDryFriction || one.kind == TorqueFault::kStribeckFriction ||
+        one.kind == TorqueFault::kSaturation || one.kind == TorqueFault::kMass || one.IsEntry();
     if (one.kind != TorqueFault::kPush && !is_shape) continue;
-    const std::tuple what(one.kind, one.index, one.push.window);
+    const bool is_geometry = one.kind == TorqueFault::kGeometry;
+    const std::tuple what(one.kind, one.index,
+                          is_geometry ? one.sums.front().front().column.component : one.push.window);
     if (std::find(seen.begin(), seen.end(), what) == seen.end()) {
       seen.push_back(what);
     } else {
@@ -276,7 +278,7 @@ bool TorqueEstimator::IsPart(const TorqueFault& fault, Part part) {
   const bool is_usual = fault.kind == kDryFriction || fault.kind == kViscousFriction || fault.kind == kOffset;
   if (part == Part::kUsual || is_usual)
     return is_usual && (part == Part::kUsual || (fault.parameters == 0 && !fault.HasVelocity()));
-  return fault.kind == kArmature || (fault.kind >= kMass && fault.kind <= kInertia);
+  return fault.kind == kArmature || (fault.kind >= kMass && fault.kind <= kInertia && !fault.IsEntry());
 }
 
 VectorXd TorqueEstimator::FitAmplitudes(Part part, Index* rank) const {

@@ -5,6 +5,8 @@
 
 #include <gmock/gmock.h>
 
+#include <regex>
+
 #include "harness/comparison/file_differences.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
@@ -158,8 +160,9 @@ TEST_F(TwoMjcfs, CompareNewerWordsOfServos) {
       "other file; explains 100 %\n");
   EXPECT_EQ(List(Compare(a, ReplaceOnce(a, " kv='5'", ""))),
             "1. robot: constraint not in the other file: servo at joint elbow: kv 5; explains 100 %\n");
-  // Its name is no part of it.
+  // Neither its name nor that of its joint is a part of it.
   EXPECT_TRUE(Compare(a, ReplaceOnce(a, "name='p'", "name='q'")).Agrees());
+  EXPECT_TRUE(Compare(a, std::regex_replace(a, std::regex("elbow"), "Elbow")).Agrees());
 }
 
 // Bodies that both files leave to the engine differ in their shapes: none lacks an inertial.
