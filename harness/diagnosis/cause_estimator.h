@@ -14,7 +14,6 @@
 // which ends where no more than noise is left.
 
 #include <functional>
-#include <limits>
 #include <span>
 #include <string>
 #include <utility>

@@ -5,7 +5,6 @@
 #include <initializer_list>
 #include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "harness/diagnosis/causes.h"

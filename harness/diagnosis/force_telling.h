@@ -2,8 +2,6 @@
 
 // Faults of the balances in words.
 
-#include <vector>
-
 #include "harness/diagnosis/causes.h"
 #include "harness/diagnosis/step_forces.h"
 

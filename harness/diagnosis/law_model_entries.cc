@@ -1,6 +1,5 @@
 // Faults of the numbers that a law of joints computes its terms of the model by.
 
-#include <algorithm>
 #include <memory>
 #include <utility>
 

@@ -3,7 +3,6 @@
 // How what arrived differs from what should have: torques that motors gave, readings that were measured.
 
 #include <limits>
-#include <string>
 #include <vector>
 
 #include "harness/diagnosis/causes.h"

@@ -2,7 +2,6 @@
 
 // The explanation of one signal: a transmission, and what is added to it.
 
-#include <optional>
 #include <string>
 #include <vector>
 

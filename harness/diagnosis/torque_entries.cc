@@ -1,9 +1,5 @@
 // Faults of a law that its torques show by themselves.
 
-#include <algorithm>
-#include <cmath>
-#include <utility>
-
 #include "harness/diagnosis/law_entries.h"
 
 namespace dexcheck {

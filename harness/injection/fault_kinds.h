@@ -7,7 +7,6 @@
 #include <random>
 #include <span>
 #include <string>
-#include <vector>
 
 #include "harness/injection/injected_fault.h"
 #include "harness/plant/random_stream.h"

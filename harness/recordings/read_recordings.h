@@ -3,7 +3,6 @@
 // Recordings of one robot that have been read: their balances, noise and drives' gains.
 
 #include <functional>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>

@@ -3,8 +3,6 @@
 // The possible faults of a model of a recorded robot, and their columns.
 
 #include <limits>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "harness/diagnosis/cause_estimator.h"
