@@ -3,6 +3,8 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <numeric>
 
 #include "controller/common/linear_algebra.h"
 #include "harness/diagnosis/search_limit.h"
@@ -47,6 +49,18 @@ class Search {
       }
       chosen_ = best;
     }
+    const std::vector<size_t> best = chosen_;
+    // With inexact columns the search begins so only if nothing was found.
+    const bool may_be_others = best.empty() ? !IsNoise(best) : best.size() > 1 && options_.floor <= 1.0;
+    if (!options_.start.empty() && may_be_others && !SearchLimit::IsOver()) {
+      chosen_ = Thin(options_.start);
+      const double other = chosen_.empty() ? kInfinity : GrowFrom(Exchange(ScoreOf(chosen_)));
+      if (other < criterion) {
+        criterion = other;
+      } else {
+        chosen_ = best;
+      }
+    }
     if (options_.exchanges_pairs) criterion = ExchangePairs(criterion);
     return Finish(criterion);
   }
@@ -60,7 +74,9 @@ class Search {
   /// Adds one after another. @returns the criterion.
   double Grow(const Best& first) {
     chosen_ = {first.candidate};
-    double criterion = first.criterion;
+    return GrowFrom(first.criterion);
+  }
+  double GrowFrom(double criterion) {
     while (chosen_.size() < options_.most_terms && !IsNoise(chosen_) && !SearchLimit::IsOver()) {
       const Best next = FindBest(chosen_);
       if (!(next.criterion < criterion)) break;
@@ -68,6 +84,31 @@ class Search {
       criterion = Exchange(next.criterion);
     }
     return criterion;
+  }
+
+  /// Those of a set, each of one column, that are needed: the least needed goes while that is for the better,
+  /// there are too many, or amplitudes cannot be.
+  [[nodiscard]] std::vector<size_t> Thin(std::vector<size_t> set) const {
+    std::erase_if(set, [&](size_t i) { return columns_.CountOf(i) != 1; });
+    while (!set.empty()) {
+      const Solution found = Solve(set);
+      // The square of the remainder grows by so much without each.
+      const double squares = found.residual.squaredNorm();
+      const VectorXd more =
+          found.amplitude.cwiseAbs2().cwiseQuotient(found.covariance.diagonal()) * found.variance;
+      std::vector<Index> impossible, all(set.size());
+      std::iota(all.begin(), all.end(), Index{0});
+      std::ranges::copy_if(all, std::back_inserter(impossible),
+                           [&](Index k) { return !CanHave(set[static_cast<size_t>(k)], found, k); });
+      const Index least = *std::ranges::min_element(impossible.empty() ? all : impossible, {},
+                                                    [&](Index k) { return more[k]; });
+      const auto count = static_cast<double>(set.size());
+      const bool is_needed =
+          Score(squares + more[least], count - 1.0, set.size() - 1) > Score(squares, count, set.size());
+      if (impossible.empty() && is_needed && set.size() <= options_.most_terms) break;
+      set.erase(set.begin() + least);
+    }
+    return set;
   }
 
   /// All that add something to those, the most likely first.

@@ -73,6 +73,9 @@ struct CauseOptions {
   /// By how much an exchange must lower the criterion. Where rows are known to rounding, an exchange that is
   /// right lowers it by many times their number.
   double least_gain = 0.005;
+  /// Candidates of one column each with which the search begins once more, of all of them but the needless:
+  /// what several explain together may look like something else to one at a time.
+  std::vector<size_t> start;
   /// Mean square of what no explanation need explain: noise, and what the columns are off themselves.
   double floor = 1.0;
   /// Rows whose noise is one and the same: 1 where each has its own. N / noise_block_size are counted then.

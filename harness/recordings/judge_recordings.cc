@@ -111,7 +111,6 @@ class Judge {
   /// Positions that are off by more than a little, rad or m: what that changes is no longer in proportion. Of
   /// friction at low speed and of a base that shakes, velocity and frequency are sought on what was found.
   void Refine(const VectorXd& left) {
-    constexpr double kLittle = 0.01;
     Refinements& next = result_.refinements;
     next.shaking = set_.refinements().shaking;
     next.gravity = set_.refinements().gravity;
@@ -123,8 +122,6 @@ class Judge {
       const VectorXd& amplitude = result_.found[i].amplitude;
       const double fraction = result_.causes[own + i].fraction;
       if (fraction < kMuch && (result_.IsWhole() || fraction < 2.0 * beyond)) continue;
-      if (fault.kind == TorqueFault::kZero && std::abs(amplitude[0]) > kLittle)
-        next.offsets[fault.index] = amplitude[0];
       if (fault.kind == TorqueFault::kStribeckFriction || fault.kind == TorqueFault::kDryFriction) {
         const TorqueColumn& shape = fault.sums.front().front().column;
         auto& known = fault.kind == TorqueFault::kDryFriction ? next.smooth : next.stribeck;

@@ -22,7 +22,6 @@ double Median(std::vector<double> values);
 
 /// The results of a first reading, so that the next has columns that fit better.
 struct Refinements {
-  std::map<int, double> offsets;        ///< Of joints' positions, rad or m.
   std::map<int, double> stribeck;       ///< Velocities below which joints have more friction, rad/s or m/s.
   std::map<int, double> smooth;         ///< Velocities over which joints' dry friction turns, rad/s or m/s.
   std::map<int, double> limits;         ///< Torques at which joints' were cut off, N m or N.

@@ -57,9 +57,6 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
     one.regressor = std::make_unique<TorqueRegressor>(*one.model);
   }
   geometry_.resize(n, static_cast<Index>(displaced_.size()));
-  constexpr double kStep = 1e-6;
-  steps_ = VectorXd::Constant(n, kStep);
-  for (const auto& [joint, offset] : refinements.offsets) steps_[joint] = -offset;
   ListColumns(has_currents);
   for (const std::vector<TorqueColumn>& columns : columns_) {
     const auto width = static_cast<Index>(columns.size()) + 1;
@@ -84,7 +81,6 @@ void TorqueBalance::ListColumns(bool has_currents) {
       for (int other = 0; other < model_->num_joints(); ++other) columns.push_back({kind, other});
     for (int other = 0; other < model_->num_joints(); ++other) {
       columns.push_back({TorqueColumn::kLatePosition, other});
-      columns.push_back({TorqueColumn::kPositionGain, other});
       for (int k = 0; k < kGeometries && !displaced_.empty(); ++k)
         columns.push_back({TorqueColumn::kGeometry, other, k});
       for (int k = 0; k < kTurns; ++k) columns.push_back({TorqueColumn::kTurn, other, k});
@@ -134,7 +130,6 @@ double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const Rec
     case TorqueColumn::kPosition:
     case TorqueColumn::kElastic:
     case TorqueColumn::kLatePosition:
-    case TorqueColumn::kPositionGain:
     case TorqueColumn::kTurn:
       return along_(joint,
                     kAlong * column.index + (column.kind - TorqueColumn::kPosition) + column.component);
@@ -229,10 +224,9 @@ Vector3d TorqueBalance::CalcMotionChange(int joint, int k, const RecordedSample&
   if (k == 0) return Vector3d::UnitX();
   if (k == 1) return torques_in_time_.row(joint).transpose();
   if (k == 2) return {rate, acceleration, sample.jerk[joint]};
-  if (k == 3) return {sample.q[joint], rate, acceleration};
-  const double turns = k < 6 ? 1.0 : 2.0, angle = turns * sample.q[joint];
-  const double e = k % 2 == 0 ? std::sin(angle) : std::cos(angle);
-  const double slope = turns * (k % 2 == 0 ? std::cos(angle) : -std::sin(angle));
+  const double turns = k < 5 ? 1.0 : 2.0, angle = turns * sample.q[joint];
+  const double e = k % 2 == 1 ? std::sin(angle) : std::cos(angle);
+  const double slope = turns * (k % 2 == 1 ? std::cos(angle) : -std::sin(angle));
   return {e, slope * rate, slope * acceleration - turns * turns * e * Square(rate)};
 }
 
@@ -261,13 +255,12 @@ void TorqueBalance::CalcMotionColumns(const RecordedSample& sample) {
   q = sample.q, qd = sample.qd, qdd = sample.qdd;
   for (Index joint = 0; joint < q.size(); ++joint)
     for (int k = 0; k < kAlong; ++k) {
-      const double step = k == 0 ? steps_[joint] : kStep;
       const Vector3d change = CalcMotionChange(static_cast<int>(joint), k, sample);
-      q[joint] += step * change[0], qd[joint] += step * change[1], qdd[joint] += step * change[2];
+      q[joint] += kStep * change[0], qd[joint] += kStep * change[1], qdd[joint] += kStep * change[2];
       auto column = along_.col(kAlong * joint + k);
       regressor_.SetMotion(q, qd, qdd, sample.base);
       regressor_.CalcTorques(column);
-      column = ((column - torques_) / step).eval();
+      column = ((column - torques_) / kStep).eval();
       column[joint] += model_->joint(static_cast<int>(joint)).damping * change[1];
       q[joint] = sample.q[joint], qd[joint] = sample.qd[joint], qdd[joint] = sample.qdd[joint];
     }

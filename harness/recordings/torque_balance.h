@@ -26,7 +26,6 @@ struct TorqueColumn {
     kPosition,      ///< By the position of joint index.
     kElastic,       ///< By its position's yielding to the torque of joint index, with its derivatives.
     kLatePosition,  ///< By a delay of the position of joint index, with its derivatives.
-    kPositionGain,  ///< By the logarithm of the gain of joint index's position.
     kTurn,  ///< By its error along a turn, with its derivatives: sine and cosine of once, then twice a turn.
     kBacklash,  ///< kPosition, with the sign of that joint's torque.
     kGeometry,  ///< By where joint index stands and how it is turned: GeometryFault's numbers.
@@ -73,7 +72,7 @@ double FindCutOff(const Refinements& refinements, int joint, int component, doub
 
 class TorqueBalance {
  public:
-  /// @param joints that are judged. @param refinements offsets: kPosition is the secant over them; shaking.
+  /// @param joints that are judged. @param refinements of the reading before.
   TorqueBalance(const RobotModel& model, const std::vector<int>& joints, bool has_currents,
                 const Refinements& refinements = {});
 
@@ -118,7 +117,7 @@ class TorqueBalance {
  private:
   static constexpr Eigen::Index kPart = 128;  // rows that are multiplied at once
   static constexpr size_t kMostBlocks = 512;
-  static constexpr int kAlong = 4 + kTurns;
+  static constexpr int kAlong = 3 + kTurns;
 
   void ListColumns(bool has_currents);
   /// Returns the torques that balance a force at each wrench's point and a moment, in its axes: n x 6 each.
@@ -163,7 +162,7 @@ class TorqueBalance {
   MatrixXd along_;            // n x kAlong n: kPosition to kTurn of each joint
   std::vector<WrenchPlace> wrenches_;
   MatrixXd wrench_squares_;
-  VectorXd torques_, late_, steps_, residual_;
+  VectorXd torques_, late_, residual_;
 };
 
 }  // namespace dexcheck

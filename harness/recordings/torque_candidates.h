@@ -57,7 +57,6 @@ struct TorqueFault : Candidate {
     kZero,
     kEccentricity,
     kLatePosition,
-    kPositionGain,
     kGeometry,
     kSaturation,
     kBacklash,
@@ -92,7 +91,7 @@ struct TorqueFault : Candidate {
     return kind == kStribeckFriction || (kind == kDryFriction && sums.size() == 2);
   }
   /// An error of a joint's measured position.
-  [[nodiscard]] bool IsOfPosition() const { return kind >= kZero && kind <= kPositionGain; }
+  [[nodiscard]] bool IsOfPosition() const { return kind >= kZero && kind <= kLatePosition; }
   /// A fault of bodies, gravity, positions or springs: all but the drive's own numbers.
   [[nodiscard]] bool IsOfLoad() const { return kind == kSpring || (kind >= kZero && kind <= kGravity); }
 };

@@ -196,6 +196,11 @@ CauseSelection TorqueEstimator::SelectAmong() const {
     if (excluded_[i]) candidates[i].columns.setZero();
   }
   CauseOptions options;
+  for (size_t i = 0; i < faults_.size(); ++i) {
+    const TorqueFault& fault = faults_[i];
+    if (fault.parameters > 0 || excluded_[i]) continue;
+    if (IsPart(fault, Part::kUsual) || fault.kind == TorqueFault::kArmature) options.start.push_back(i);
+  }
   options.most_terms = most_causes_;
   options.restarts = 0;
   options.exchanges_pairs = false;
