@@ -108,23 +108,18 @@ class MutantList {
 
 /// Files that agree are known better than to the digits of their numbers: takes these as exact.
 void TakeAsExact(PrintedRobot* robot) {
-  constexpr double kHalf = 1e-9;
-  const auto take_origin = [&](PrintedOrigin* origin) {
-    origin->half_t = origin->half_t.cwiseMin(kHalf);
-    origin->half_r = origin->half_r.cwiseMin(kHalf);
+  const auto take = [](double* half) {
+    constexpr double kHalf = 1e-9;
+    *half = std::min(*half, kHalf);
   };
-  const auto take = [&](PrintedScalar* number) { number->half = std::min(number->half, kHalf); };
   for (PrintedLink& link : robot->links) {
-    take_origin(&link.origin);
-    link.joint.half_axis = link.joint.half_axis.cwiseMin(kHalf);
-    for (auto& number : link.joint.scalars) {
-      if (number) take(&*number);
-    }
-    for (size_t k = 0; link.joint.range && k < 2; ++k) take(&(*link.joint.range)[k]);
+    for (const LinkNumber& number : ListNumbers(&link.origin)) take(number.half);
+    for (double& half : link.joint.half_axis) take(&half);
+    for (auto& number : link.joint.scalars)
+      if (number) take(&number->half);
+    for (size_t k = 0; link.joint.range && k < 2; ++k) take(&(*link.joint.range)[k].half);
     if (!link.inertial) continue;
-    take(&link.inertial->mass);
-    take_origin(&link.inertial->origin);
-    link.inertial->half_I = link.inertial->half_I.cwiseMin(kHalf);
+    for (const LinkNumber& number : ListNumbers(&*link.inertial)) take(number.half);
   }
 }
 

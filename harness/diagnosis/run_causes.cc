@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <numeric>
 #include <tuple>
@@ -19,64 +18,54 @@ namespace dexcheck {
 namespace {
 
 /// The largest that a fault of each unit can be in this robot.
-class PlausibleSizes {
- public:
-  explicit PlausibleSizes(const StepStore& store) {
-    const RobotModel& model = store.setup().model();
-    double mass = model.base_with_wheels().mass, reach = 0.0, effort = 0.0;
-    for (const Joint& joint : model.joints()) {
-      mass += joint.body.mass;
-      reach += joint.X_PB.translation().norm() + std::abs(joint.mdh.a) + std::abs(joint.mdh.d);
-    }
-    const mjModel& engine = store.setup().engine();
-    for (int i = 0; i < engine.nu; ++i)
-      if (engine.actuator_ctrllimited[i] != 0)
-        effort =
-            std::max(effort, std::abs(engine.actuator_ctrlrange[2 * i + 1] * engine.actuator_gear[6 * i]));
-    if (store.setup().has_object()) mass += store.setup().declared_object().body.mass;
-    constexpr double kMany = 10.0, kEarth = 10.0;  // of anything; m/s^2
-    const double weight = mass * kEarth;
-    const double torque = kMany * std::max(effort, weight * reach), force = kMany * std::max(effort, weight);
-    // Friction that takes all torque at a hundredth of a radian or metre a second.
-    constexpr double kSlow = 1e-2;
-    most_ = {{"N m", torque},
-             {"N", force},
-             {"N m s/rad", torque / kSlow},
-             {"N s/m", force / kSlow},
-             {"kg", kMany * mass},
-             {"m/s^2", 2.0 * kEarth},
-             {"deg", 90.0},
-             {"s", 1.0}};
+std::map<std::string, double> ListMostPlausible(const StepStore& store) {
+  const RobotModel& model = store.setup().model();
+  double mass = model.base_with_wheels().mass, reach = 0.0, effort = 0.0;
+  for (const Joint& joint : model.joints()) {
+    mass += joint.body.mass;
+    reach += joint.X_PB.translation().norm() + std::abs(joint.mdh.a) + std::abs(joint.mdh.d);
   }
+  const mjModel& engine = store.setup().engine();
+  for (int i = 0; i < engine.nu; ++i)
+    if (engine.actuator_ctrllimited[i] != 0)
+      effort = std::max(effort, std::abs(engine.actuator_ctrlrange[2 * i + 1] * engine.actuator_gear[6 * i]));
+  if (store.setup().has_object()) mass += store.setup().declared_object().body.mass;
+  constexpr double kMany = 10.0, kEarth = 10.0;  // of anything; m/s^2
+  const double weight = mass * kEarth;
+  const double torque = kMany * std::max(effort, weight * reach), force = kMany * std::max(effort, weight);
+  // Friction that takes all torque at a hundredth of a radian or metre a second.
+  constexpr double kSlow = 1e-2;
+  return {{"N m", torque},
+          {"N", force},
+          {"N m s/rad", torque / kSlow},
+          {"N s/m", force / kSlow},
+          {"kg", kMany * mass},
+          {"m/s^2", 2.0 * kEarth},
+          {"deg", 90.0},
+          {"s", 1.0}};
+}
 
-  /// Whether such a fault can be. What is no size, and what motion does not show, is none.
-  [[nodiscard]] bool CanBe(const Fault& fault) const {
-    if (fault.fault == kUnknownFault || std::isnan(fault.value)) return true;
-    const bool is_factor = fault.unit.empty();
-    const bool has_no_size =
-        fault.value == 0.0 && !is_factor && (!(fault.error < kNever) || fault.error > 0.0);
-    if (!std::isfinite(fault.value) || has_no_size) return false;
-    // No time, mass, friction and size of a step is negative.
-    for (const char* kind :
-         {"delay", "lag", "dead zone", "backlash", "noise", "rounding", "mass", "friction"})
-      if (fault.value < 0.0 && !is_factor && fault.fault.find(kind) != std::string::npos) return false;
-    const auto most = most_.find(fault.unit);
-    return most == most_.end() || std::abs(fault.value) <= most->second;
-  }
-
- private:
-  static constexpr double kNever = std::numeric_limits<double>::infinity();
-  std::map<std::string, double> most_;
-};
+/// Whether such a fault can be. What is no size, and what motion does not show, is none.
+bool CanBe(const Fault& fault, const std::map<std::string, double>& most_plausible) {
+  if (fault.fault == kUnknownFault || std::isnan(fault.value)) return true;
+  const bool is_factor = fault.unit.empty();
+  const bool has_no_size = fault.value == 0.0 && !is_factor && fault.error != 0.0;
+  if (!std::isfinite(fault.value) || has_no_size) return false;
+  // No time, mass, friction and size of a step is negative.
+  for (const char* kind : {"delay", "lag", "dead zone", "backlash", "noise", "rounding", "mass", "friction"})
+    if (fault.value < 0.0 && !is_factor && fault.fault.find(kind) != std::string::npos) return false;
+  const auto most = most_plausible.find(fault.unit);
+  return most == most_plausible.end() || std::abs(fault.value) <= most->second;
+}
 
 /// Impossible faults are left out; a residual that only they would explain is not explained.
 void DropImpossible(const StepStore& store, Causes* causes) {
-  const PlausibleSizes sizes(store);
+  const std::map<std::string, double> most = ListMostPlausible(store);
   for (Explanation& one : *causes) {
     // A law can ask for anything.
     if (one.faults.empty() || one.channel == CauseChannel::kLaw) continue;
     const std::string place = one.faults.front().place;
-    const auto dropped = std::erase_if(one.faults, [&](const Fault& fault) { return !sizes.CanBe(fault); });
+    const auto dropped = std::erase_if(one.faults, [&](const Fault& fault) { return !CanBe(fault, most); });
     if (dropped == 0) continue;
     if (one.faults.empty()) {
       one.faults.push_back({kUnknownFault, place, 0.0, 0.0, "", ""});

@@ -108,8 +108,7 @@ class Judge {
     Refine(after);
   }
 
-  /// Positions that are off by more than a little, rad or m: what that changes is no longer in proportion. Of
-  /// friction at low speed and of a base that shakes, velocity and frequency are sought on what was found.
+  /// Of friction at low speed and of a base that shakes, velocity and frequency are sought on what was found.
   void Refine(const VectorXd& left) {
     Refinements& next = result_.refinements;
     next.shaking = set_.refinements().shaking;

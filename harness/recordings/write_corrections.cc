@@ -75,35 +75,25 @@ Corrections Collect(const RobotModel& model, const RecordingJudgement& judgement
   return corrections;
 }
 
-/// A link's body with what is added to it, in the frame of its file.
-class CorrectedBody {
- public:
-  CorrectedBody(const RobotDescription& robot, int link)
-      : name_(robot.spec.joints[static_cast<size_t>(link)].link),
-        before_(robot.spec.joints[static_cast<size_t>(link)].body) {
-    const auto part = std::ranges::find_if(
-        robot.parts, [&](const DescribedPart& one) { return one.name == name_ && one.joint == link; });
-    if (part == robot.parts.end()) return;
-    X_ = part->X_iL;
-    before_ = ExpressIn(part->body, X_);
+/// Returns a link's body with what is added to it, in the frame of its file.
+MassProperties CorrectBody(const RobotDescription& robot, int link, const TorqueRegressor::BodyVector& change,
+                           CorrectedFile* file) {
+  const Joint& joint = robot.spec.joints[static_cast<size_t>(link)];
+  const auto part = std::ranges::find_if(
+      robot.parts, [&](const DescribedPart& one) { return one.name == joint.link && one.joint == link; });
+  const bool has_part = part != robot.parts.end();
+  const Pose X = has_part ? part->X_iL : Pose::Identity();  // of the part in frame i
+  const TorqueRegressor::BodyVector before =
+      TorqueRegressor::Pack(has_part ? ExpressIn(part->body, X) : joint.body);
+  TorqueRegressor::BodyVector after = before + change;
+  // Each correction is of a body that can be; several together need not be.
+  if (!IsBody(after) && IsBody(before)) {
+    after = FindNearestBody(after);
+    file->left.push_back("link " + joint.link +
+                         ": what was found is together no body that can be; the nearest one is written");
   }
-
-  [[nodiscard]] MassProperties Add(const TorqueRegressor::BodyVector& change, CorrectedFile* file) const {
-    TorqueRegressor::BodyVector after = TorqueRegressor::Pack(before_) + change;
-    // Each correction is of a body that can be; several together need not be.
-    if (!IsBody(after) && IsBody(TorqueRegressor::Pack(before_))) {
-      after = FindNearestBody(after);
-      file->left.push_back("link " + name_ +
-                           ": what was found is together no body that can be; the nearest one is written");
-    }
-    return ExpressIn(TorqueRegressor::Unpack(after), X_.inverse());
-  }
-
- private:
-  std::string name_;
-  Pose X_ = Pose::Identity();  // of the part in frame i
-  MassProperties before_;      // in frame i
-};
+  return ExpressIn(TorqueRegressor::Unpack(after), X.inverse());
+}
 
 /// Says that the format has no place for a correction.
 void MoveToLeft(const std::string& what, CorrectedFile* file) {
@@ -143,7 +133,7 @@ PrintedRobot CorrectPrinted(const RobotDescription& robot, PrintedRobot printed,
     const std::string& name = robot.spec.joints[static_cast<size_t>(link)].link;
     PrintedLink& one = find([&](const PrintedLink& each) { return each.name == name; }, name);
     if (!one.inertial) one.inertial.emplace();
-    const MassProperties body = CorrectedBody(robot, link).Add(change, file);
+    const MassProperties body = CorrectBody(robot, link, change, file);
     const Matrix3d R = one.inertial->origin.CalcRotation();
     one.inertial->mass.value = body.mass;
     one.inertial->origin.t = body.com;
