@@ -149,14 +149,11 @@ LawEntry& LawEntryList::AddEdit(const std::string& fault, const Edit& edit) {
   return entry;
 }
 
-LawEntry& LawEntryList::AddFactor(const std::string& fault, const Edit& remove) {
-  LawEntry& entry = Add(fault, [remove](const LawAtStep& at) -> MatrixXd {
-    LawInputs inputs = at.inputs;
-    remove(at, &inputs);
-    return -at.CalcChange(inputs);
-  });
+void LawEntryList::AddFactor(const std::string& fault, const Edit& remove) {
+  LawEntry& entry = AddEdit(fault, remove);
+  entry.force = [whole = entry.force](const LawAtStep& at) -> MatrixXd { return -whole(at); };
+  entry.is_whole = false;
   entry.nominal = 1.0;
-  return entry;
 }
 
 void LawEntryList::AddFactors() {

@@ -35,7 +35,7 @@ class LawEntryList {
   /// A fault that is there or not.
   LawEntry& AddEdit(const std::string& fault, const Edit& edit);
   /// A factor of what an edit takes out.
-  LawEntry& AddFactor(const std::string& fault, const Edit& remove);
+  void AddFactor(const std::string& fault, const Edit& remove);
   void AddFactors();
   /// Signals of some steps before.
   void AddOldSignals();

@@ -97,11 +97,16 @@ void StepStore::NameReadings() {
         turns ? (i == 0 ? "rate of " + base.wheel_joint_right : "rate of " + base.wheel_joint_left)
               : "velocity " + std::to_string(i),
         turns || i > 0 ? "rad/s" : "m/s", "base velocities");
+    const bool wheels = base.type == BaseType::kDifferentialDrive;
+    motors_.push_back(
+        {"motor " + (wheels ? (i == 0 ? base.wheel_joint_right : base.wheel_joint_left) : base.link),
+         "torque", "N m", "motors"});
   }
   for (int k = 0; k < model.num_dofs(); ++k) {
     const bool slides =
         model.joints()[static_cast<size_t>(model.joint_of_dof(k))].type == JointType::kPrismatic;
     add("joint " + model.dof_name(k), "rate", slides ? "m/s" : "rad/s", "joint rates");
+    motors_.push_back({"motor " + model.dof_name(k), "torque", slides ? "N" : "N m", "motors"});
   }
   const std::string object = "object " + (setup_->has_object() ? setup_->object().name : std::string());
   for (const char* axis : kAxes) add(object, std::string("position ") + axis, "m", "object position");
@@ -115,18 +120,6 @@ void StepStore::NameReadings() {
   }
   add("hand", "support force", "N", "support force");
   add("hand", "set of touching fingertips", "", "touch");
-
-  for (int i = 0; i < model.num_base_velocities(); ++i) {
-    const bool wheels = base.type == BaseType::kDifferentialDrive;
-    motors_.push_back(
-        {"motor " + (wheels ? (i == 0 ? base.wheel_joint_right : base.wheel_joint_left) : base.link),
-         "torque", "N m", "motors"});
-  }
-  for (int k = 0; k < model.num_dofs(); ++k) {
-    const bool slides =
-        model.joints()[static_cast<size_t>(model.joint_of_dof(k))].type == JointType::kPrismatic;
-    motors_.push_back({"motor " + model.dof_name(k), "torque", slides ? "N" : "N m", "motors"});
-  }
 }
 
 void StepStore::Reset() {

@@ -211,9 +211,8 @@ class Judge {
       result_.notes.push_back("the time step of a simulator explains a part of the torques: no cause");
       return;
     }
-    Explanation one;
+    Explanation one = MakeCause(description_.Describe(fault, term.amplitude, term.error));
     one.channel = CauseChannel::kBalance;
-    one.from = one.to = std::numeric_limits<double>::quiet_NaN();
     if (fault.kind == TorqueFault::kPush) {
       const auto& blocks = set_[static_cast<size_t>(fault.push.recording)].fit->blocks();
       one.from = std::max(fault.push.from, blocks.front().from);
@@ -221,7 +220,6 @@ class Judge {
       one.ends = true;
     }
     FoundFault found{fault, term.amplitude, term.error};
-    one.faults.push_back(description_.Describe(fault, term.amplitude, term.error));
     const bool is_shared = description_.AddWholeNumbers(&found, &one.faults.front());
     for (const auto& [candidate, amplitude] : term.same) {
       const TorqueFault& other = estimator_.faults()[candidate];
