@@ -40,13 +40,6 @@ Fault MakeGrowing(const Candidate& candidate, const VectorXd& a, const VectorXd&
   return fault;
 }
 
-/// Returns the axes of a link's own frame in frame i; of what is no link, its own.
-Matrix3d FindLinkAxes(const std::string& place, const RobotModel& model) {
-  const auto joint =
-      std::ranges::find_if(model.joints(), [&](const Joint& one) { return place == "link " + one.link; });
-  return joint == model.joints().end() ? Matrix3d(Matrix3d::Identity()) : joint->R_iL;
-}
-
 /// Turns vectors and tensors of a body from frame i.
 VectorXd TurnToLink(const Candidate& candidate, VectorXd a, const Matrix3d& R_Li) {
   const auto turn = [&](Index at) { a.segment<3>(at) = (R_Li * a.segment<3>(at)).eval(); };
@@ -73,7 +66,10 @@ double CalcGrowthBegin(const VectorXd& a, double end) {
 Fault MakeForceFault(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error,
                      const RobotModel& model) {
   const Vector3d& gravity = model.gravity();
-  const Matrix3d R_Li = FindLinkAxes(candidate.place, model).transpose();
+  // What is no link has its own axes.
+  Matrix3d R_Li = Matrix3d::Identity();
+  for (const Joint& one : model.joints())
+    if (candidate.place == "link " + one.link) R_Li = one.R_iL.transpose();
   const VectorXd a = TurnToLink(candidate, amplitude, R_Li);
   if (candidate.fault.ends_with(kGrows)) return MakeGrowing(candidate, a, error);
   Fault fault{candidate.fault,          candidate.place,

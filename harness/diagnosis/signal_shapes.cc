@@ -287,15 +287,11 @@ VectorXd TransmitAlways(const Fault& fault, const SignalSeries& series) {
   return late + (value - std::floor(value)) * (Shift(u, std::min(whole + 1, last)) - late);
 }
 
-/// Whether a step comes long after the one before it.
-bool IsAfterGap(const VectorXd& time, Index step) {
-  return step == 0 || time[step] - time[step - 1] > 1.5 * (time[1] - time[0]);
-}
-
 VectorXd FollowAtDistance(double half, const SignalSeries& series) {
   VectorXd output = series.got;
+  const VectorXd& time = series.time;
   for (Index i = 1; i < output.size(); ++i)
-    if (!IsAfterGap(series.time, i))
+    if (time[i] - time[i - 1] <= 1.5 * (time[1] - time[0]))  // not after a gap
       output[i] = std::clamp(output[i - 1], series.expected[i] - half, series.expected[i] + half);
   return output;
 }

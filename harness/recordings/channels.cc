@@ -17,13 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::string& NameOfColumn(const RecordingReader& reader, size_t column) {
-  return reader.names()[column];
-}
-
 /// "column 3 (tau_2)".
 std::string Describe(const RecordingReader& reader, size_t column) {
-  const std::string& name = NameOfColumn(reader, column);
+  const std::string& name = reader.names()[column];
   return "column " + std::to_string(column + 1) + (name.empty() ? "" : " (" + name + ")");
 }
 

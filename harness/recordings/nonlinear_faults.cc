@@ -13,15 +13,6 @@ using Eigen::Index;
 
 constexpr double kNoSize = std::numeric_limits<double>::quiet_NaN();  // of an exchange
 
-bool IsTorque(const Channel& channel) {
-  return channel.quantity == RecordedQuantity::kTorque || channel.quantity == RecordedQuantity::kCurrent;
-}
-
-bool IsMotion(const Channel& channel) {
-  return channel.quantity == RecordedQuantity::kPosition || channel.quantity == RecordedQuantity::kVelocity ||
-         channel.quantity == RecordedQuantity::kAcceleration;
-}
-
 /// Faults of positions and torques that nothing in the recording speaks against: its units, its columns, and
 /// the joints' ranges.
 class NonlinearFaults {
@@ -194,9 +185,10 @@ void NonlinearFault::Undo(Recording* recording) const {
       continue;
     }
     const bool is_position = one.quantity == RecordedQuantity::kPosition;
-    const bool is_changed =
-        IsTorque(one) ? is_torque : is_motion && IsMotion(one) && (is_position || !has_right_rates);
-    if (!is_changed) continue;
+    const bool is_effort =
+        one.quantity == RecordedQuantity::kTorque || one.quantity == RecordedQuantity::kCurrent;
+    const bool is_changed = is_effort ? is_torque : is_motion && (is_position || !has_right_rates);
+    if (!is_changed || CountComponents(one.quantity) > 0) continue;
     if (!order.empty()) {
       one.joint = order[static_cast<size_t>(one.joint)];
     } else if (joint < 0 || one.joint == joint) {
