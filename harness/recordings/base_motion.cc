@@ -14,6 +14,16 @@ namespace {
 
 using Eigen::Index;
 
+/// A stretch that stands out, without what smoothing makes of its begin and end.
+Push TrimWindow(const VectorXd& squares, Index first, Index last,
+                const std::vector<TorqueBalance::Block>& blocks) {
+  const double whole = Median({squares.begin() + first, squares.begin() + last + 1});
+  constexpr double kNearlyWhole = 0.25;  // half of it
+  while (first < last && squares[first] < kNearlyWhole * whole) ++first;
+  while (last > first && squares[last] < kNearlyWhole * whole) --last;
+  return {.from = blocks[static_cast<size_t>(first)].from, .to = blocks[static_cast<size_t>(last)].to};
+}
+
 /// The few stretches that stand out most.
 std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueBalance::Block>& blocks) {
   constexpr size_t kMost = 3;
@@ -31,8 +41,7 @@ std::vector<Push> FindWindows(const VectorXd& squares, const std::vector<TorqueB
     while (stays(first - 1) || stays(first - 2)) --first;
     while (stays(last + 1) || stays(last + 2)) ++last;
     // A residual that stands out half of the time is no push.
-    const Push push{.from = blocks[static_cast<size_t>(first)].from,
-                    .to = blocks[static_cast<size_t>(last)].to};
+    const Push push = TrimWindow(squares, first, last, blocks);
     // Windows of smoothing overlap, so that what acts shows in more than one sample.
     if (last - first <= squares.size() / 2 && push.from < push.to) windows.push_back(push);
     rest.segment(first, last - first + 1).setZero();

@@ -170,6 +170,9 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
         .joint = fault.index};
     (is_placement ? geometry.shift : geometry.turn) = fault.axes * a;
     one.detail = DescribeGeometry(model_, frames_, geometry);
+  } else if (fault.kind == kPositionGain) {
+    one.value = 1.0 / (1.0 - a[0]);
+    one.error *= Square(one.value);
   } else if (fault.kind == kSpring) {
     one.detail = "at rest at " + FormatNumber(-a[1] / a[0], 3);
   } else if (fault.kind == kShaking) {

@@ -46,11 +46,12 @@ Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const N
 /// A wrong geometry of the model is rarer than a wrong body.
 constexpr long kRarer = 2;
 
-/// Returns how many numbers explain a judgement, with those that velocities are off by. A displacement is a
-/// first guess of what is searched for.
+/// Returns how many numbers explain a judgement, with those that velocities are off by. A displacement and a
+/// gain of positions are first guesses of what is searched for.
 long CountNumbers(const RecordingJudgement& judgement) {
-  const long guesses = std::ranges::count(judgement.found, TorqueFault::kGeometry,
-                                          [](const FoundFault& one) { return one.fault.kind; });
+  const long guesses = std::ranges::count_if(judgement.found, [](const FoundFault& one) {
+    return one.fault.kind == TorqueFault::kGeometry || one.fault.kind == TorqueFault::kPositionGain;
+  });
   return judgement.by_causes.numbers + (kRarer + 1) * guesses +
          std::ranges::count(judgement.causes, CauseChannel::kMeasurement, &Explanation::channel);
 }

@@ -81,6 +81,7 @@ void TorqueBalance::ListColumns(bool has_currents) {
       for (int other = 0; other < model_->num_joints(); ++other) columns.push_back({kind, other});
     for (int other = 0; other < model_->num_joints(); ++other) {
       columns.push_back({TorqueColumn::kLatePosition, other});
+      columns.push_back({TorqueColumn::kPositionGain, other});
       for (int k = 0; k < kGeometries && !displaced_.empty(); ++k)
         columns.push_back({TorqueColumn::kGeometry, other, k});
       for (int k = 0; k < kTurns; ++k) columns.push_back({TorqueColumn::kTurn, other, k});
@@ -130,6 +131,7 @@ double TorqueBalance::CalcEntry(int joint, const TorqueColumn& column, const Rec
     case TorqueColumn::kPosition:
     case TorqueColumn::kElastic:
     case TorqueColumn::kLatePosition:
+    case TorqueColumn::kPositionGain:
     case TorqueColumn::kTurn:
       return along_(joint,
                     kAlong * column.index + (column.kind - TorqueColumn::kPosition) + column.component);
@@ -224,9 +226,10 @@ Vector3d TorqueBalance::CalcMotionChange(int joint, int k, const RecordedSample&
   if (k == 0) return Vector3d::UnitX();
   if (k == 1) return torques_in_time_.row(joint).transpose();
   if (k == 2) return {rate, acceleration, sample.jerk[joint]};
-  const double turns = k < 5 ? 1.0 : 2.0, angle = turns * sample.q[joint];
-  const double e = k % 2 == 1 ? std::sin(angle) : std::cos(angle);
-  const double slope = turns * (k % 2 == 1 ? std::cos(angle) : -std::sin(angle));
+  if (k == 3) return {sample.q[joint], rate, acceleration};
+  const double turns = k < 6 ? 1.0 : 2.0, angle = turns * sample.q[joint];
+  const double e = k % 2 == 0 ? std::sin(angle) : std::cos(angle);
+  const double slope = turns * (k % 2 == 0 ? std::cos(angle) : -std::sin(angle));
   return {e, slope * rate, slope * acceleration - turns * turns * e * Square(rate)};
 }
 

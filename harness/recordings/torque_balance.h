@@ -26,6 +26,7 @@ struct TorqueColumn {
     kPosition,      ///< By the position of joint index.
     kElastic,       ///< By its position's yielding to the torque of joint index, with its derivatives.
     kLatePosition,  ///< By a delay of the position of joint index, with its derivatives.
+    kPositionGain,  ///< By the logarithm of the gain of joint index's position.
     kTurn,  ///< By its error along a turn, with its derivatives: sine and cosine of once, then twice a turn.
     kBacklash,  ///< kPosition, with the sign of that joint's torque.
     kGeometry,  ///< By where joint index stands and how it is turned: GeometryFault's numbers.
@@ -117,7 +118,7 @@ class TorqueBalance {
  private:
   static constexpr Eigen::Index kPart = 128;  // rows that are multiplied at once
   static constexpr size_t kMostBlocks = 512;
-  static constexpr int kAlong = 3 + kTurns;
+  static constexpr int kAlong = 4 + kTurns;
 
   void ListColumns(bool has_currents);
   /// Returns the torques that balance a force at each wrench's point and a moment, in its axes: n x 6 each.

@@ -203,7 +203,9 @@ class FaultList {
     add(kZero, "position offset", angle, {{TorqueColumn::kPosition, joint}, -1, -1.0},
         std::min(turns ? kPi : 1.0, range > 0.0 ? range : kInfinite));
     AddDelay(kLatePosition, joint, "delay of the position", {{{TorqueColumn::kLatePosition, joint}}});
-    constexpr double kMostError = 0.1;
+    constexpr double kMostOff = 0.3, kMostError = 0.1;
+    Add(kPositionGain, joint, "position gain", "", {{{{TorqueColumn::kPositionGain, joint}, -1, -1.0}}}, 1.0)
+        .is_possible = IsNoLonger(kMostOff, VectorXd::Zero(1));
     for (const int harmonics : {2, kTurns}) {
       if (!turns) break;
       TorqueFault& turn = Add(kEccentricity, joint, "eccentric encoder", "rad", {});

@@ -57,6 +57,7 @@ struct TorqueFault : Candidate {
     kZero,
     kEccentricity,
     kLatePosition,
+    kPositionGain,
     kGeometry,
     kSaturation,
     kBacklash,
@@ -91,7 +92,7 @@ struct TorqueFault : Candidate {
     return kind == kStribeckFriction || (kind == kDryFriction && sums.size() == 2);
   }
   /// An error of a joint's measured position.
-  [[nodiscard]] bool IsOfPosition() const { return kind >= kZero && kind <= kLatePosition; }
+  [[nodiscard]] bool IsOfPosition() const { return kind >= kZero && kind <= kPositionGain; }
   /// A fault of bodies, gravity, positions or springs: all but the drive's own numbers.
   [[nodiscard]] bool IsOfLoad() const { return kind == kSpring || (kind >= kZero && kind <= kGravity); }
 };
