@@ -1,9 +1,13 @@
 #include "renders/image.h"
 
+#include <cairo.h>
+
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "controller/common/errors.h"
+#include "harness/base/files.h"
 
 namespace dexcheck {
 
@@ -55,6 +59,67 @@ void PlaceInset(const Image& inset, Image* image) {
     if (row < 0 || row >= inset.height) continue;
     std::copy_n(inset.Pixel(0, row), 3 * inset.width, image->Pixel(x, y + row));
   }
+}
+
+namespace {
+
+/// Calls act(the pixel of the picture, the same of the surface) for all of them; both are equally large.
+template <typename SomeImage, typename Action>
+void ForEachPixel(SomeImage& image, cairo_surface_t* surface, const Action& act) {
+  cairo_surface_flush(surface);
+  unsigned char* const data = cairo_image_surface_get_data(surface);
+  const int stride = cairo_image_surface_get_stride(surface);
+  for (int y = 0; y < image.height; ++y) {
+    auto* pixel = image.Pixel(0, y);
+    unsigned char* bgrx = data + static_cast<std::ptrdiff_t>(y) * stride;
+    for (int x = 0; x < image.width; ++x, pixel += 3, bgrx += 4) act(pixel, bgrx);
+  }
+  cairo_surface_mark_dirty(surface);
+}
+
+}  // namespace
+
+std::shared_ptr<cairo_surface_t> ToSurface(const Image& image) {
+  std::shared_ptr<cairo_surface_t> surface(
+      cairo_image_surface_create(CAIRO_FORMAT_RGB24, image.width, image.height), cairo_surface_destroy);
+  ForEachPixel(image, surface.get(),
+               [](const std::uint8_t* rgb, unsigned char* bgrx) { std::reverse_copy(rgb, rgb + 3, bgrx); });
+  return surface;
+}
+
+void CopySurface(cairo_surface_t* surface, Image* image) {
+  ForEachPixel(*image, surface,
+               [](std::uint8_t* rgb, const unsigned char* bgrx) { std::reverse_copy(bgrx, bgrx + 3, rgb); });
+}
+
+void RequireExtension(const std::filesystem::path& path, const char* extension) {
+  if (ExtensionOf(path) == extension) return;
+  throw InputError(path.string() + ": cannot be written: the name must end in " + extension);
+}
+
+void WritePng(const std::filesystem::path& path, const Image& image) {
+  RequireExtension(path, ".png");
+  PartialFile file(path);
+  const auto append = [](void* bytes, const unsigned char* data, unsigned count) {
+    static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), count);
+    return CAIRO_STATUS_SUCCESS;
+  };
+  std::string bytes;
+  const cairo_status_t status = cairo_surface_write_to_png_stream(ToSurface(image).get(), append, &bytes);
+  if (status != CAIRO_STATUS_SUCCESS) file.Fail(cairo_status_to_string(status));
+  file.Write(bytes);
+  file.Commit();
+}
+
+Image ReadPng(const std::filesystem::path& path) {
+  const std::shared_ptr<cairo_surface_t> surface(cairo_image_surface_create_from_png(path.c_str()),
+                                                 cairo_surface_destroy);
+  const cairo_status_t status = cairo_surface_status(surface.get());
+  if (status != CAIRO_STATUS_SUCCESS)
+    throw InputError(path.string() + ": cannot be read: " + cairo_status_to_string(status));
+  Image image(cairo_image_surface_get_width(surface.get()), cairo_image_surface_get_height(surface.get()));
+  CopySurface(surface.get(), &image);
+  return image;
 }
 
 }  // namespace dexcheck

@@ -3,7 +3,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <memory>
 #include <vector>
+
+struct _cairo_surface;  // NOLINT(bugprone-reserved-identifier): Cairo chose this name
 
 namespace dexcheck {
 
@@ -37,5 +41,21 @@ Image ReduceBottomUp(const std::uint8_t* source, int width, int height, int fact
 /// Puts a smaller picture with a thin frame into the lower right corner.
 /// @throws std::invalid_argument when it does not fit.
 void PlaceInset(const Image& inset, Image* image);
+
+/// The picture as Cairo draws on it: four bytes a pixel, blue first.
+std::shared_ptr<_cairo_surface> ToSurface(const Image& image);
+/// @param image as large as the surface.
+void CopySurface(_cairo_surface* surface, Image* image);
+
+/// @throws InputError "PATH: cannot be written: ..." unless the name ends in the extension, in small or
+/// capital letters. @param extension ".mp4" for a video, ".png" for a picture.
+void RequireExtension(const std::filesystem::path& path, const char* extension);
+
+/// Writes a PNG file, which appears whole or not at all.
+/// @throws InputError "PATH: cannot be written: reason", or as RequireExtension.
+void WritePng(const std::filesystem::path& path, const Image& image);
+
+/// @throws InputError "PATH: cannot be read: reason".
+Image ReadPng(const std::filesystem::path& path);
 
 }  // namespace dexcheck

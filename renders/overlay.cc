@@ -10,7 +10,6 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "harness/base/files.h"
-#include "renders/cairo_surface.h"
 
 namespace dexcheck {
 
@@ -62,7 +61,7 @@ Font::Font(const std::filesystem::path& path) {
   const std::unique_ptr<FcPattern, decltype(&FcPatternDestroy)> pattern(
       FcPatternBuild(nullptr, FC_FILE, FcTypeString, path.c_str(), nullptr), FcPatternDestroy);
   face_.reset(cairo_ft_font_face_create_for_pattern(pattern.get()), cairo_font_face_destroy);
-  const SurfacePtr surface = ToSurface(Image(1, 1));
+  const auto surface = ToSurface(Image(1, 1));
   const CairoPtr cairo = MakeCairo(surface.get());
   const bool has_width = MeasureWith(cairo, face_.get(), "x", 10.0) > 0.0;
   const cairo_status_t status = cairo_status(cairo.get());
@@ -72,14 +71,12 @@ Font::Font(const std::filesystem::path& path) {
 }
 
 double Font::Measure(const std::string& text, double size) const {
-  static const SurfacePtr surface = ToSurface(Image(1, 1));
+  static const auto surface = ToSurface(Image(1, 1));
   return MeasureWith(MakeCairo(surface.get()), face_.get(), MendUtf8(text), size);
 }
 
 Canvas::Canvas(Image* image)
-    : image_(*image),
-      surface_(ToSurface(*image).release(), cairo_surface_destroy),
-      cairo_(MakeCairo(surface_.get())) {}
+    : image_(*image), surface_(ToSurface(*image)), cairo_(MakeCairo(surface_.get())) {}
 
 Canvas::~Canvas() { CopySurface(surface_.get(), &image_); }
 

@@ -17,7 +17,6 @@
 // NOLINTBEGIN(bugprone-reserved-identifier)
 struct _cairo;
 struct _cairo_font_face;
-struct _cairo_surface;
 // NOLINTEND(bugprone-reserved-identifier)
 
 namespace dexcheck {

@@ -18,7 +18,6 @@
 #include "harness/base/process_pool.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/map_vector.h"
-#include "renders/cairo_surface.h"
 #include "renders/overlay.h"
 #include "renders/renderer.h"
 #include "renders/viewpoint.h"
@@ -64,11 +63,6 @@ std::vector<std::string> MakeCommand(const PartialFile& file, const EncodingOpti
 
 }  // namespace
 
-void RequireExtension(const std::filesystem::path& path, const char* extension) {
-  if (ExtensionOf(path) == extension) return;
-  throw InputError(path.string() + ": cannot be written: the name must end in " + extension);
-}
-
 VideoWriter::VideoWriter(const std::filesystem::path& path, const EncodingOptions& options)
     : file_(path), options_(Checked(options, path)) {
   int ends[2];
@@ -111,30 +105,6 @@ void VideoWriter::FinishEncoding() {
   std::string reason = messages_.ReadLastLine();
   if (end.exit_code == kNotFoundExitCode) reason = "ffmpeg cannot be run (Debian's package ffmpeg has it)";
   file_.Fail(end.signal != 0 ? end.Describe("") : reason.empty() ? "ffmpeg failed" : "ffmpeg: " + reason);
-}
-
-void WritePng(const std::filesystem::path& path, const Image& image) {
-  RequireExtension(path, ".png");
-  PartialFile file(path);
-  const auto append = [](void* bytes, const unsigned char* data, unsigned count) {
-    static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), count);
-    return CAIRO_STATUS_SUCCESS;
-  };
-  std::string bytes;
-  const cairo_status_t status = cairo_surface_write_to_png_stream(ToSurface(image).get(), append, &bytes);
-  if (status != CAIRO_STATUS_SUCCESS) file.Fail(cairo_status_to_string(status));
-  file.Write(bytes);
-  file.Commit();
-}
-
-Image ReadPng(const std::filesystem::path& path) {
-  const SurfacePtr surface(cairo_image_surface_create_from_png(path.c_str()));
-  const cairo_status_t status = cairo_surface_status(surface.get());
-  if (status != CAIRO_STATUS_SUCCESS)
-    throw InputError(path.string() + ": cannot be read: " + cairo_status_to_string(status));
-  Image image(cairo_image_surface_get_width(surface.get()), cairo_image_surface_get_height(surface.get()));
-  CopySurface(surface.get(), &image);
-  return image;
 }
 
 namespace {

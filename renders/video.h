@@ -23,10 +23,6 @@ struct EncodingOptions {
   int fps = 30;      ///< Frames a second.
 };
 
-/// @throws InputError "PATH: cannot be written: ..." unless the name ends in the extension, in small or
-/// capital letters. @param extension ".mp4" for a video, ".png" for a picture.
-void RequireExtension(const std::filesystem::path& path, const char* extension);
-
 /// Writes a video that browsers play while it loads, frame by frame: H.264 (yuv420p, BT.709) in MP4, whose
 /// index stands before the data. The program ffmpeg encodes it. The file appears under its name when it is
 /// finished; until then, and after an error, there is nothing.
@@ -57,13 +53,6 @@ class VideoWriter {
   std::optional<ChildProcess> process_;
   long frames_ = 0;
 };
-
-/// Writes a PNG file, which appears whole or not at all.
-/// @throws InputError "PATH: cannot be written: reason", or as RequireExtension.
-void WritePng(const std::filesystem::path& path, const Image& image);
-
-/// @throws InputError "PATH: cannot be read: reason".
-Image ReadPng(const std::filesystem::path& path);
 
 /// Cameras that move along: near to all that moves, and near to the object. An MJCF's cameras of these names
 /// come first.

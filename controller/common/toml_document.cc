@@ -1,13 +1,11 @@
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -96,40 +94,23 @@ void Place(std::string_view path, Change mode, toml::node* value,
     const bool is_last = dot == std::string_view::npos;
     if (key.empty()) fail("its path has an empty part");
     if (toml::array* const list = at->as_array()) {
-      size_t index = 0;
-      const auto [end, error] = std::from_chars(key.data(), key.data() + key.size(), index);
-      if (error != std::errc() || end != key.data() + key.size() || index >= list->size()) {
+      const size_t index = ParseNumber<size_t>(key).value_or(list->size());
+      if (index >= list->size())
         fail(Quote(key) + " is no entry of a list of " + std::to_string(list->size()));
-      }
-      if (is_last && mode == Change::kRemove) {
-        list->erase(list->cbegin() + static_cast<std::ptrdiff_t>(index));
-        return;
-      }
-      if (is_last) {
-        list->replace(list->cbegin() + static_cast<std::ptrdiff_t>(index), std::move(*value));
-        return;
-      }
+      const auto entry = list->cbegin() + static_cast<std::ptrdiff_t>(index);
+      if (is_last && mode == Change::kRemove) return (void)list->erase(entry);
+      if (is_last) return (void)list->replace(entry, std::move(*value));
       at = list->get(index);
     } else if (toml::table* const table = at->as_table()) {
-      if (is_last && mode == Change::kAppend) {
-        if (!table->contains(key)) table->insert(key, toml::array{});
-        toml::array* const list = table->get(key)->as_array();
-        if (list == nullptr) fail(Quote(path) + " is no list");
-        list->push_back(std::move(*value));
-        return;
-      }
-      if (mode == Change::kRemove && !table->contains(key))
-        fail(Quote(path.substr(0, dot)) + " is not there");
-      if (is_last && mode == Change::kRemove) {
-        table->erase(key);
-        return;
-      }
-      if (is_last) {
-        table->insert_or_assign(key, std::move(*value));
-        return;
-      }
-      if (!table->contains(key)) table->insert(key, toml::table{});
+      const bool is_there = table->contains(key);
+      if (mode == Change::kRemove && !is_there) fail(Quote(path.substr(0, dot)) + " is not there");
+      if (is_last && mode == Change::kRemove) return (void)table->erase(key);
+      if (is_last && mode == Change::kSet) return (void)table->insert_or_assign(key, std::move(*value));
+      if (!is_there && is_last) table->insert(key, toml::array{});
+      if (!is_there && !is_last) table->insert(key, toml::table{});
       at = table->get(key);
+      if (is_last && !at->is_array()) fail(Quote(path) + " is no list");
+      if (is_last) return at->as_array()->push_back(std::move(*value));
     } else {
       fail(Quote(path.substr(0, begin - 1)) + " is no table or list");
     }
@@ -168,39 +149,6 @@ void Assign(std::string_view assignment, toml::table* root) {
   if (parsed.size() != 1) fail("is not a value");
   const Change mode = removes ? Change::kRemove : appends ? Change::kAppend : Change::kSet;
   Place(path, mode, parsed.get("value"), fail, root);
-}
-
-/// The toml as printed, with each number in its shortest form: the printer writes 0.59999999999999998 for
-/// 0.6.
-std::string ShortenNumbers(const std::string& toml) {
-  constexpr std::string_view kQuotes = "'\"";
-  constexpr std::string_view kNumber = "+-.0123456789eE";
-  std::string shortened;
-  for (size_t at = 0; at < toml.size();) {
-    const size_t begin = at;
-    if (kQuotes.find(toml[at]) != std::string_view::npos) {
-      const std::string three(3, toml[at]);
-      const std::string quote = toml.compare(at, 3, three) == 0 ? three : toml.substr(at, 1);
-      for (at += quote.size(); at < toml.size() && toml.compare(at, quote.size(), quote) != 0; ++at) {
-        if (toml[at] == '\\' && toml[begin] == '"') ++at;
-      }
-      at += quote.size();
-    } else {
-      const bool is_number = kNumber.find(toml[at]) != std::string_view::npos;
-      const size_t end = is_number ? toml.find_first_not_of(kNumber, at) : at + 1;
-      at = std::min(end, toml.size());
-    }
-    const std::string word = toml.substr(begin, at - begin);
-    double value = 0.0;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    const bool is_long = word.size() > std::numeric_limits<double>::max_digits10 &&
-                         word.find('.') != std::string::npos && error == std::errc() &&
-                         end == word.data() + word.size();
-    std::string number = is_long ? FormatNumber(value) : word;
-    if (is_long && number.find_first_of(".e") == std::string::npos) number += ".0";  // it stays no integer
-    shortened += number;
-  }
-  return shortened;
 }
 
 }  // namespace
@@ -252,7 +200,7 @@ std::string ApplyOverrides(const std::string& text, const std::string& source,
   for (const std::string& assignment : overrides) Assign(assignment, &root);
   std::ostringstream stream;
   stream << root << '\n';
-  return ShortenNumbers(stream.str());
+  return stream.str();
 }
 
 std::string QuoteToml(std::string_view text) {

@@ -1,7 +1,6 @@
 #include "controller/control/constrained_dynamics.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"

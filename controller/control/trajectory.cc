@@ -136,14 +136,6 @@ DesiredMotion EvaluateKnots(const std::vector<Knot>& knots, double t) {
 
 enum class Type { kLine, kPointToPoint, kOscillation, kWeave, kCircle, kWayPoints, kSum };
 
-// [linear under one key; angles under another, rad or degrees], 0 where a key is missing.
-Vector6d ReadCoordinates(TomlTable& table, std::string_view linear, const std::string& angular) {
-  Vector6d X = Vector6d::Zero();
-  if (const auto value = table.Find(linear)) X.head<3>() = value->AsVector<3>();
-  if (const auto angles = table.FindAngles<3>(angular)) X.tail<3>() = *angles;
-  return X;
-}
-
 double ReadRampTime(TomlTable& table) {
   const auto value = table.Find("ramp_time");
   return value ? value->AsNotNegative() : 0.0;
@@ -375,6 +367,13 @@ std::unique_ptr<Trajectory> MakeSumTrajectory(const Vector6d& X_start,
     }
     return sum;
   });
+}
+
+Vector6d ReadCoordinates(TomlTable& table, std::string_view linear, const std::string& angular) {
+  Vector6d X = Vector6d::Zero();
+  if (const auto value = table.Find(linear)) X.head<3>() = value->AsVector<3>();
+  if (const auto angles = table.FindAngles<3>(angular)) X.tail<3>() = *angles;
+  return X;
 }
 
 TrajectoryMaker ReadTrajectory(TomlTable& table) {

@@ -5,6 +5,8 @@
 
 #include <functional>
 #include <memory>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "controller/common/toml_reader.h"
@@ -116,6 +118,9 @@ std::unique_ptr<Trajectory> MakeWayPointTrajectory(const Vector6d& X_start,
 /// @param parts each with X_start = 0. @throws std::invalid_argument without parts.
 std::unique_ptr<Trajectory> MakeSumTrajectory(const Vector6d& X_start,
                                               std::vector<std::unique_ptr<Trajectory>> parts);
+
+/// [linear under one key; angles under another, rad or degrees], 0 where a key is missing.
+Vector6d ReadCoordinates(TomlTable& table, std::string_view linear, const std::string& angular);
 
 /// Makes a trajectory that starts at X_start.
 using TrajectoryMaker = std::function<std::unique_ptr<Trajectory>(const Vector6d& X_start)>;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "controller/grasp/grasp_rank.h"
+#include "controller/grasp/force_closure.h"
 
 namespace dexcheck::grasp_internal {
 namespace {

@@ -1,6 +1,5 @@
 #include "harness/base/check_record.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "controller/common/text.h"

@@ -1,6 +1,7 @@
 #include "harness/base/files.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <spawn.h>
 #include <stdlib.h>
 #include <sys/stat.h>
@@ -224,10 +225,7 @@ std::vector<std::filesystem::path> ListFolder(const std::filesystem::path& folde
 std::string HashBytes(std::string_view bytes) {
   std::uint64_t hash = 0xcbf29ce484222325U;
   for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-  constexpr std::string_view kDigits = "0123456789abcdef";
-  std::string digits;
-  for (int shift = 60; shift >= 0; shift -= 4) digits += kDigits[(hash >> shift) & 15U];
-  return digits;
+  return fmt::format("{:016x}", hash);
 }
 
 std::filesystem::path FindInstalled(const std::filesystem::path& name) {

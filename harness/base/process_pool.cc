@@ -15,7 +15,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/base/byte_archive.h"
 
 namespace dexcheck {
 namespace {

@@ -7,7 +7,6 @@
 #include <fstream>
 #include <string_view>
 
-#include "controller/common/toml_reader.h"
 #include "harness/base/bounded_json.h"
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"

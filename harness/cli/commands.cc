@@ -24,37 +24,37 @@
 
 namespace dexcheck::cli {
 
-ValueCheck WholeNumber(std::uint64_t least, std::uint64_t most) {
-  return [least, most](const std::string& text) -> std::string {
-    const auto value = ParseNumber<std::uint64_t>(text);
-    if (value && least <= *value && *value <= most) return {};
-    return "must be a whole number from " + std::to_string(least) + " to " + std::to_string(most) + ", got " +
-           Quote(text);
+namespace {
+
+/// Accepts texts that are numbers of a kind. @param demand what is said of others.
+template <typename Number, typename IsGood>
+ValueCheck CheckNumber(const std::string& demand, IsGood is_good) {
+  return [=](const std::string& text) {
+    const std::optional<Number> value = ParseNumber<Number>(text);
+    return value && is_good(*value) ? std::string() : demand + ", got " + Quote(text);
   };
+}
+
+}  // namespace
+
+ValueCheck WholeNumber(std::uint64_t least, std::uint64_t most) {
+  return CheckNumber<std::uint64_t>(
+      "must be a whole number from " + std::to_string(least) + " to " + std::to_string(most),
+      [=](std::uint64_t value) { return least <= value && value <= most; });
 }
 
 ValueCheck PositiveNumber(const std::string& demand) {
-  return [demand](const std::string& text) {
-    const double value = ParseNumber<double>(text).value_or(std::nan(""));
-    return std::isfinite(value) && value > 0.0 ? std::string() : demand + ", got " + Quote(text);
-  };
+  return CheckNumber<double>(demand, [](double value) { return std::isfinite(value) && value > 0.0; });
 }
 
 ValueCheck NumberFrom(double least, double most) {
-  return [least, most](const std::string& text) {
-    const double value = ParseNumber<double>(text).value_or(std::nan(""));
-    if (least <= value && value <= most) return std::string();
-    return "must be a number from " + FormatNumber(least) + " to " + FormatNumber(most) + ", got " +
-           Quote(text);
-  };
+  return CheckNumber<double>("must be a number from " + FormatNumber(least) + " to " + FormatNumber(most),
+                             [=](double value) { return least <= value && value <= most; });
 }
 
 ValueCheck Fraction() {
-  return [](const std::string& text) {
-    const double value = ParseNumber<double>(text).value_or(std::nan(""));
-    if (0.0 < value && value < 1.0) return std::string();
-    return "must be a number above 0 and below 1, got " + Quote(text);
-  };
+  return CheckNumber<double>("must be a number above 0 and below 1",
+                             [](double value) { return 0.0 < value && value < 1.0; });
 }
 
 CLI::App* AddCommand(CLI::App* app, const std::string& name, const std::string& help,

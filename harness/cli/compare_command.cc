@@ -11,7 +11,6 @@
 #include "controller/common/text.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/report.h"
-#include "harness/report/page_frame.h"
 #include "harness/report/run_comparison.h"
 #include "harness/report/run_data.h"
 

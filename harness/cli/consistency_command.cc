@@ -1,10 +1,6 @@
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 
 #include "controller/common/errors.h"

@@ -8,7 +8,6 @@
 
 #include "controller/common/text.h"
 #include "harness/base/check_record.h"
-#include "harness/base/console.h"
 #include "harness/comparison/consistency.h"
 #include "harness/comparison/file_differences.h"
 #include "harness/engine/engine.h"

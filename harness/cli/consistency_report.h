@@ -2,7 +2,6 @@
 
 // The request of `consistency`, and the report of its results.
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,11 +8,9 @@
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
 #include "controller/dynamics/torque_regressor.h"
-#include "harness/base/console.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"
 #include "harness/cli/report.h"
-#include "harness/cli/run_folder.h"
 #include "harness/descriptions/read_description.h"
 #include "harness/engine/clearance.h"
 #include "harness/recordings/motion_design.h"

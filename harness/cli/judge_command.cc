@@ -2,12 +2,9 @@
 
 #include <algorithm>
 #include <cctype>
-#include <chrono>
 #include <cmath>
-#include <memory>
 #include <optional>
 
-#include "controller/common/errors.h"
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/cli/commands.h"

@@ -16,7 +16,6 @@
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
 #include "harness/base/version.h"
-#include "harness/base/watched_process.h"
 #include "harness/cli/commands.h"
 
 namespace dexcheck::cli {

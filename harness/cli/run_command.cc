@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <exception>
-#include <memory>
 #include <optional>
 #include <string>
 #include <thread>

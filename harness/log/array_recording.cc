@@ -5,10 +5,9 @@
 #include <algorithm>
 
 #include "controller/common/errors.h"
-#include "controller/common/text.h"
-#include "harness/base/byte_archive.h"
 #include "harness/base/child_process.h"
 #include "harness/base/files.h"
+#include "harness/base/process_pool.h"
 #include "harness/log/hdf5_handle.h"
 #include "harness/log/log_reader.h"
 #include "harness/log/npy_file.h"

@@ -11,7 +11,6 @@
 #include <exception>
 #include <map>
 #include <stdexcept>
-#include <system_error>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"

@@ -18,7 +18,6 @@
 #include "harness/base/bounded_json.h"
 #include "harness/base/files.h"
 #include "harness/base/interrupts.h"
-#include "harness/checks/check_table.h"
 #include "harness/checks/failure_cause.h"
 #include "harness/report/page_frame.h"
 #include "harness/run/runner.h"

@@ -4,7 +4,6 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "controller/control/joint_controller.h"
 #include "harness/run/runner.h"

@@ -7,13 +7,11 @@
 #include <atomic>
 #include <csignal>
 #include <exception>
-#include <optional>
 #include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/control/joint_controller.h"
-#include "harness/base/watched_process.h"
+#include "harness/base/interrupts.h"
 #include "harness/run/own_controller.h"
 
 namespace dexcheck {
@@ -58,7 +56,7 @@ class ForeignLibrary {
  public:
   /// @throws InputError when it cannot be loaded.
   explicit ForeignLibrary(const OwnControllerSetup& setup) : name_(setup.name), timer_(setup) {
-    Guard([&] { handle_.reset(dlopen(FindControllerFile(setup.own).c_str(), RTLD_NOW | RTLD_LOCAL)); },
+    Guard([&] { handle_.reset(dlopen(FindControllerFile(setup.own()).c_str(), RTLD_NOW | RTLD_LOCAL)); },
           kPatience);
     if (handle_ == nullptr) throw InputError(name_ + ": " + dlerror());
   }
@@ -89,12 +87,12 @@ class ForeignLibrary {
       constexpr double kShortest = 1e-6;  // s; a timer of 0 never looks
       ++timed.libraries;
       timed.line =
-          setup.name + ": did not return in time (" + FormatNumber(setup.own.time_limit) + " s for a step)";
+          setup.name + ": did not return in time (" + FormatNumber(setup.own().time_limit) + " s for a step)";
       struct sigaction action {};
       action.sa_handler = LookAtCall;
       action.sa_flags = SA_RESTART;
       ::sigaction(SIGALRM, &action, nullptr);
-      SetTimer(std::max(kShortest, setup.own.time_limit / kLooks));
+      SetTimer(std::max(kShortest, setup.own().time_limit / kLooks));
     }
     ~Timer() {
       if (--timed.libraries == 0) SetTimer(0.0);
@@ -121,20 +119,23 @@ class ForeignLibrary {
 };
 
 /// A library in C++.
-class LibraryController final : public Controller {
+class LibraryController final : public OwnController {
  public:
-  LibraryController(std::unique_ptr<ForeignLibrary> library, const OwnControllerSetup& setup)
-      : setup_(setup), parameters_(setup.own.parameters), library_(std::move(library)) {
+  LibraryController(std::unique_ptr<ForeignLibrary> library, const OwnControllerSetup& own)
+      : OwnController(own),
+        options_(own.setup.MakeControllerOptions()),
+        parameters_(own.own().parameters),
+        library_(std::move(library)) {
     RequireInterface();
     const auto make = library_->Find<Controller*(const ControllerContext*)>("dexcheck_make_controller");
-    if (setup_.joints != nullptr) joints_.emplace(setup_.joints->motion, setup_.sampling.time_step);
-    const ControllerContext context{*setup_.model,
-                                    setup_.fingertips,
-                                    setup_.object,
-                                    *setup_.surface,
-                                    setup_.options,
-                                    setup_.sampling,
-                                    setup_.joints != nullptr ? &setup_.joints->gains : nullptr,
+    const Setup& setup = own.setup;
+    const ControllerContext context{setup.model(),
+                                    setup.fingertips(),
+                                    setup.object().body,
+                                    setup.surface(),
+                                    options_,
+                                    own.sampling,
+                                    joints_ ? &setup.joints()->gains : nullptr,
                                     &parameters_};
     std::string refusal = "made no controller";
     library_->Guard(
@@ -146,35 +147,35 @@ class LibraryController final : public Controller {
           }
         },
         kPatience);
-    if (controller_ == nullptr) throw InputError(setup_.name + ": " + refusal);
+    if (controller_ == nullptr) throw InputError(own.name + ": " + refusal);
     const std::vector<std::string>& asked = parameters_.asked();
     for (const auto& [parameter, value] : parameters_.given()) {
       if (std::ranges::find(asked, parameter) == asked.end())
-        RejectParameter(
-            setup_, parameter,
-            asked.empty() ? "asks for no parameters" : fmt::format("asks for {}", fmt::join(asked, ", ")));
+        own.RejectParameter(parameter, asked.empty() ? "asks for no parameters"
+                                                     : fmt::format("asks for {}", fmt::join(asked, ", ")));
     }
   }
 
   void Follow(const Trajectory& motion) override {
-    steps_until_due_ = 0;
+    Restart();
     library_->Guard([&] { controller_->Follow(motion); });
   }
 
   void Begin(double t, const Reading& reading) override {
-    if (joints_) joints_->Begin();
-    steps_until_due_ = 0;
+    BeginMotion();
     library_->Guard([&] { controller_->Begin(t, reading); }, kPatience);
   }
 
   void Step(const Reading& reading, double t, Command* command) override {
-    if (joints_) {
-      joints_->Fill(reading, t, command);
-      command->computes_joints = steps_until_due_ == 0;
-    }
+    const bool is_due = CountStep(reading, t, command);
     library_->Guard([&] { controller_->Step(reading, t, command); });
-    RequireTorques(setup_.name, *command, setup_.model->num_velocities());
-    RequireHeld(command->tau);
+    RequireTorques(*command);
+    if (is_due) held_ = command->tau;
+    if (command->tau == held_) return;
+    const Sampling& sampling = setup_.sampling;
+    throw ControllerFailure(fmt::format("{}: changed its torques within plant.control_step ({} s)",
+                                        setup_.name,
+                                        static_cast<double>(sampling.hold) * sampling.time_step));
   }
   [[nodiscard]] bool is_done() const override { return controller_->is_done(); }
   [[nodiscard]] const GraspModel& model() const override { return controller_->model(); }
@@ -192,24 +193,8 @@ class LibraryController final : public Controller {
                      Quote(DescribeControllerInterface()));
   }
 
-  void RequireHeld(const VectorXd& tau) {
-    const Sampling& sampling = setup_.sampling;
-    if (steps_until_due_ == 0) {
-      steps_until_due_ = sampling.hold;
-      held_ = tau;
-    }
-    --steps_until_due_;
-    if (tau != held_) {
-      throw ControllerFailure(fmt::format("{}: changed its torques within plant.control_step ({} s)",
-                                          setup_.name,
-                                          static_cast<double>(sampling.hold) * sampling.time_step));
-    }
-  }
-
-  OwnControllerSetup setup_;
+  GraspControllerOptions options_;
   ControllerParameters parameters_;
-  std::optional<JointDemand> joints_;
-  long steps_until_due_ = 0;
   VectorXd held_;                            // torques of the last control step, n
   std::unique_ptr<ForeignLibrary> library_;  // outlives the controller
   std::unique_ptr<Controller> controller_;
@@ -259,7 +244,7 @@ class LibraryPeer final : public ControllerPeer {
 
   void SetParameters() override {
     const auto set = library_->Find<const char*(void*, const char*, double)>("dexcheck_set_parameter");
-    for (const auto& [parameter, value] : setup_.own.parameters) {
+    for (const auto& [parameter, value] : setup_.own().parameters) {
       std::string problem;
       library_->Guard([&, name = parameter.c_str(), number = value] {
         if (const char* text = set(controller_, name, number)) problem = Abbreviate(text);

@@ -1,13 +1,11 @@
 #include "harness/run/loop_parts.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "controller/common/toml_reader.h"
 #include "controller/control/joint_controller.h"
 #include "harness/plant/engine_plant.h"
 #include "harness/plant/rigid_plant.h"

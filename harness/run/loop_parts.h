@@ -2,10 +2,8 @@
 
 // The parts of the loop that a scenario names.
 
-#include <filesystem>
 #include <functional>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "controller/control/controller.h"

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "controller/control/controller.h"
 #include "controller/control/controller_library.h"
 #include "controller/control/controller_protocol.h"
+#include "controller/control/joint_controller.h"
 #include "harness/plant/plant.h"
 #include "harness/scenario/setup.h"
 
@@ -37,25 +39,38 @@ std::string HashController(const OwnControllerOptions& own);
 
 /// Inputs of a controller of the user's own.
 struct OwnControllerSetup {
-  std::string name;  ///< For messages: "controller law.so".
-  const RobotModel* model = nullptr;
-  std::vector<int> fingertips;
-  MassProperties object;
-  const Surface* surface = nullptr;
-  GraspControllerOptions options;
+  const Setup& setup;  ///< Outlives the controller.
   Sampling sampling;
-  const JointPlan* joints = nullptr;  ///< Plan of a scenario that moves joints; else null.
-  std::string robot_text;             ///< The parameter file, with the changes made to it.
-  std::string scenario_text;          ///< The scenario, with the changes made to it.
-  OwnControllerOptions own;
+  std::string name;           ///< For messages: "controller law.so".
+  std::string robot_text;     ///< The parameter file, with the changes made to it.
+  std::string scenario_text;  ///< The scenario, with the changes made to it.
+
+  [[nodiscard]] const OwnControllerOptions& own() const { return setup.scenario().controller; }
+  /// Throws the error of a controller that does not take a parameter. @param why such as "takes none".
+  [[noreturn]] void RejectParameter(const std::string& parameter, const std::string& why) const;
 };
 
-/// Throws the error of a controller that does not take a parameter. @param why such as "takes no parameters".
-[[noreturn]] void RejectParameter(const OwnControllerSetup& setup, const std::string& parameter,
-                                  const std::string& why);
+/// One that is called at each step. It counts the steps for which torques are held.
+class OwnController : public Controller {
+ protected:
+  explicit OwnController(const OwnControllerSetup& setup);
+  /// Torques are due at the next step.
+  void Restart() { steps_until_due_ = 0; }
+  void BeginMotion() {
+    if (joints_) joints_->Begin();
+    Restart();
+  }
+  /// Counts a step, whose desired joints it fills in. @returns whether torques are due.
+  bool CountStep(const Reading& reading, double t, Command* command);
+  /// @throws ControllerFailure unless there are n torques.
+  void RequireTorques(const Command& command) const;
 
-/// @throws ControllerFailure, in the name of `who`, unless there are n torques.
-void RequireTorques(const std::string& who, const Command& command, Eigen::Index n);
+  OwnControllerSetup setup_;
+  std::optional<JointDemand> joints_;  // of a scenario that moves joints
+
+ private:
+  long steps_until_due_ = 0;
+};
 
 /// The other side of controller/control/controller_protocol.h: a program, or a shared library in C.
 class ControllerPeer {

@@ -39,12 +39,12 @@ class ProgramPeer final : public ControllerPeer {
  public:
   ProgramPeer(const OwnControllerSetup& setup, std::vector<std::string> words) : setup_(setup) {
     constexpr std::string_view kSocket = "unix:";
-    if (setup.own.run.starts_with(kSocket)) {
-      Connect(setup.own.run.substr(kSocket.size()));
+    if (setup.own().run.starts_with(kSocket)) {
+      Connect(setup.own().run.substr(kSocket.size()));
     } else {
       Start(std::move(words));
     }
-    SetTimeLimit(kGreetingFraction * setup_.own.time_limit);
+    SetTimeLimit(kGreetingFraction * setup_.own().time_limit);
   }
 
   /// Ends the program, by force when it does not end by itself.
@@ -68,13 +68,13 @@ class ProgramPeer final : public ControllerPeer {
       throw InputError(setup_.name + ": speaks protocol " + std::to_string(answer.protocol) +
                        ", this program " + std::to_string(DEXCHECK_PROTOCOL));
     }
-    if ((answer.flags & DEXCHECK_PARAMETERS) == 0) SetTimeLimit(setup_.own.time_limit);
+    if ((answer.flags & DEXCHECK_PARAMETERS) == 0) SetTimeLimit(setup_.own().time_limit);
     return answer.flags;
   }
 
   void SetParameters() override {
     std::string text;
-    for (const auto& [name, value] : setup_.own.parameters) text += name + " " + FormatNumber(value) + "\n";
+    for (const auto& [name, value] : setup_.own().parameters) text += name + " " + FormatNumber(value) + "\n";
     const dexcheck_message header{DEXCHECK_SET_PARAMETERS, static_cast<uint32_t>(text.size())};
     Send(&header, sizeof(header));
     Send(text.data(), text.size());
@@ -82,7 +82,7 @@ class ProgramPeer final : public ControllerPeer {
     if (reply.type != DEXCHECK_SET_PARAMETERS)
       throw ControllerFailure(setup_.name + ": answered its parameters with message " +
                               std::to_string(reply.type));
-    SetTimeLimit(setup_.own.time_limit);
+    SetTimeLimit(setup_.own().time_limit);
   }
 
   void Begin() override {
@@ -115,7 +115,7 @@ class ProgramPeer final : public ControllerPeer {
       process_.emplace(setup_.name, Program{.words = std::move(words),
                                             .input = theirs.get(),
                                             .output = theirs.get(),
-                                            .folder = setup_.own.folder});
+                                            .folder = setup_.own().folder});
     } catch (const Error& error) {
       throw ControllerFailure(error.what());
     }

@@ -1,12 +1,10 @@
 #include "harness/run/run_mutation.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
 
-#include "controller/common/text.h"
 #include "harness/checks/check_table.h"
 #include "harness/diagnosis/mutation.h"
 

@@ -6,15 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <tuple>
 
 #include "controller/common/text.h"
 #include "controller/common/toml_reader.h"
 #include "controller/control/joint_motion.h"
 #include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
-#include "harness/base/console.h"
-#include "harness/descriptions/description_writer.h"
 
 namespace dexcheck {
 namespace {

@@ -20,20 +20,14 @@ constexpr double kVariedStart =
 /// Finds joints, and says what of the scenario does not fit them.
 class JointReader {
  public:
-  JointReader(const Scenario& scenario, const RobotModel& model) : source_(scenario.source), model_(model) {}
+  JointReader(const Scenario& scenario, const RobotModel& model)
+      : scenario_(scenario), source_(scenario.source), model_(model) {}
 
   [[nodiscard]] int Find(const std::string& key, const std::string& name, bool in_degrees) const {
-    const std::string where = source_ + ": " + key + ": ";
-    const int joint = model_.FindJoint(name);
-    if (joint < 0) {
-      std::vector<std::string> names;
-      for (const Joint& one : model_.joints()) names.push_back(one.name);
-      throw InputError(where + Quote(name) + " is no joint of the model" +
-                       SuggestInBrackets(name, names, ""));
-    }
-    if (in_degrees && model_.joints()[static_cast<size_t>(joint)].type == JointType::kPrismatic) {
-      throw InputError(where + Quote(name) + " is prismatic: give it in m, under the key without _deg");
-    }
+    const int joint = RequireJoint(scenario_, key, model_, name);
+    if (in_degrees && model_.joint(joint).type == JointType::kPrismatic)
+      throw InputError(source_ + ": " + key + ": " + Quote(name) +
+                       " is prismatic: give it in m, under the key without _deg");
     return joint;
   }
 
@@ -42,13 +36,8 @@ class JointReader {
     if (model_.num_joints() == 0)
       throw InputError(source_ + ": stance: the robot must have joints to stand by");
     std::vector<int> feet;
-    for (const std::string& name : names) {
-      try {
-        feet.push_back(model_.FindFrame(name));
-      } catch (const std::invalid_argument&) {
-        throw InputError(source_ + ": stance.feet: " + Quote(name) + " is no frame of the model");
-      }
-    }
+    for (const std::string& name : names)
+      feet.push_back(RequireFrame(scenario_, "stance.feet", model_, name));
     return feet;
   }
 
@@ -85,6 +74,7 @@ class JointReader {
   }
 
  private:
+  const Scenario& scenario_;
   const std::string& source_;
   const RobotModel& model_;
 };

@@ -1,16 +1,20 @@
 #include "harness/scenario/robot_pair.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "controller/dynamics/model_terms.h"
 #include "controller/model/parameter_reader.h"
 #include "harness/base/files.h"
 #include "harness/comparison/engine_constants.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/mujoco_release.h"
+#include "harness/plant/random_stream.h"
 
 namespace dexcheck {
 namespace {
@@ -157,5 +161,241 @@ DeclaredMismatch::DeclaredMismatch(RobotModel the_plant, MjModelPtr engine_witho
       without(std::move(engine_without)),
       plant_adapter(plant, engine, source),
       controller_adapter(model, *without, source) {}
+
+namespace {
+
+using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+
+/// The robot's links and the object, by name: base, joints' links, object.
+class Bodies {
+ public:
+  Bodies(const Adapter& adapter, mjModel* engine, RobotSpec* plant)
+      : adapter_(&adapter), engine_(engine), plant_(plant) {
+    names_.push_back(plant->base.link);
+    for (const Joint& joint : plant->joints) names_.push_back(joint.link);
+    if (plant->object) names_.emplace_back("object");
+    FindLinkFrames();
+  }
+
+  [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
+
+  /// A link: the object's centre of mass is where its frame stands.
+  [[nodiscard]] size_t FindLink(const std::string& name, const std::string& key,
+                                const std::string& source) const {
+    const auto end = names_.end() - (plant_->object ? 1 : 0);
+    const auto found = std::find(names_.begin(), end, name);
+    if (found != end) return static_cast<size_t>(found - names_.begin());
+    throw InputError(source + ": " + key + ": is no link of the robot" +
+                     SuggestInBrackets(name, {names_.begin(), end}, "") + ", got " + Quote(name));
+  }
+
+  /// The base with its wheels.
+  void ScaleMass(size_t body, double factor) {
+    MassProperties& model = Model(body);
+    model.mass *= factor;
+    model.inertia *= factor;
+    if (body == 0) {
+      WheelProperties& wheel = plant_->base.wheel;
+      for (double* value : {&wheel.mass, &wheel.spin_inertia, &wheel.transverse_inertia}) *value *= factor;
+    }
+    for (const int id : EngineBodies(body)) {
+      engine_->body_mass[id] *= factor;
+      for (int i = 0; i < 3; ++i) engine_->body_inertia[3 * id + i] *= factor;
+    }
+  }
+
+  void MoveCom(size_t body, const Vector3d& shift) {
+    Model(body).com += shift;
+    const Vector3d moved = R_engine_link_[body] * shift;
+    for (const int id : EngineBodies(body)) {
+      if (IsWheel(id)) continue;
+      // Bodies that are welded to the link's own are turned against it at most.
+      const Eigen::Map<const RowMatrix3d> R_own(reference_->xmat + 9 * MainBody(body));
+      const Eigen::Map<const RowMatrix3d> R(reference_->xmat + 9 * id);
+      Eigen::Map<Vector3d>(engine_->body_ipos + 3 * id) += R.transpose() * R_own * moved;
+      ForgetSameFrame(id);
+    }
+  }
+
+  void AddPoint(size_t body, double mass, const Vector3d& at) {
+    Model(body) = Combine({Model(body), MassProperties{.mass = mass, .com = at}});
+    const int id = MainBody(body);
+    MassProperties own;
+    own.mass = engine_->body_mass[id];
+    own.com = Eigen::Map<const Vector3d>(engine_->body_ipos + 3 * id);
+    const mjtNum* const iquat = engine_->body_iquat + 4 * id;
+    const Matrix3d R = Eigen::Quaterniond(iquat[0], iquat[1], iquat[2], iquat[3]).toRotationMatrix();
+    own.inertia = R * Eigen::Map<const Vector3d>(engine_->body_inertia + 3 * id).asDiagonal() * R.transpose();
+    const Vector3d point = R_engine_link_[body] * at + p_engine_link_[body];
+    const MassProperties both = Combine({own, MassProperties{.mass = mass, .com = point}});
+    engine_->body_mass[id] = both.mass;
+    Eigen::Map<Vector3d>(engine_->body_ipos + 3 * id) = both.com;
+    const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(both.inertia);
+    Matrix3d axes = principal.eigenvectors();
+    if (axes.determinant() < 0.0) axes.col(0) *= -1.0;
+    const Eigen::Quaterniond turned(axes);
+    Eigen::Map<Vector3d>(engine_->body_inertia + 3 * id) = principal.eigenvalues();
+    mjtNum* const quat = engine_->body_iquat + 4 * id;
+    quat[0] = turned.w();
+    quat[1] = turned.x();
+    quat[2] = turned.y();
+    quat[3] = turned.z();
+    ForgetSameFrame(id);
+  }
+
+ private:
+  /// The body's inertial frame is no longer where it was: nothing may be taken to stand there.
+  void ForgetSameFrame(int id) {
+    engine_->body_simple[id] = 0;
+    engine_->body_sameframe[id] = 0;
+    const auto forget = [id](EngineSize count, const int* bodies, mjtByte* frames) {
+      for (int i = 0; i < count; ++i) {
+        if (bodies[i] == id && IsInertialFrame(frames[i])) frames[i] = 0;
+      }
+    };
+    forget(engine_->ngeom, engine_->geom_bodyid, engine_->geom_sameframe);
+    forget(engine_->nsite, engine_->site_bodyid, engine_->site_sameframe);
+  }
+  [[nodiscard]] bool IsObject(size_t body) const {
+    return plant_->object.has_value() && body == names_.size() - 1;
+  }
+  MassProperties& Model(size_t body) {
+    if (IsObject(body)) return plant_->object->body;
+    return body == 0 ? plant_->base.body : plant_->joints[body - 1].body;
+  }
+  [[nodiscard]] int MainBody(size_t body) const {
+    return IsObject(body) ? adapter_->object_body() : adapter_->link_bodies()[body];
+  }
+  [[nodiscard]] std::vector<int> EngineBodies(size_t body) const {
+    if (IsObject(body)) return {adapter_->object_body()};
+    return adapter_->welded_bodies()[body];
+  }
+
+  [[nodiscard]] bool IsWheel(int id) const {
+    const auto& wheels = adapter_->wheels();
+    return std::any_of(wheels.begin(), wheels.end(), [&](const EngineWheel& wheel) {
+      return engine_->body_weldid[id] == engine_->body_weldid[engine_->jnt_bodyid[wheel.joint]];
+    });
+  }
+
+  /// Pose of each link's frame in the engine's body of it.
+  void FindLinkFrames() {
+    const RobotModel& model = adapter_->model();
+    const VectorXd q = VectorXd::Zero(model.num_positions());
+    ModelTerms kinematics(model, Coordinates::kReduced);
+    kinematics.SetState(q, VectorXd::Zero(model.num_velocities()));
+    reference_ = MakeDataWithoutContacts(*engine_);
+    adapter_->SetPositions(q, reference_->qpos);
+    mj_kinematics(engine_, reference_.get());
+    for (int i = -1; i < model.num_joints(); ++i) {
+      const int id = MainBody(static_cast<size_t>(i + 1));
+      const Eigen::Map<const RowMatrix3d> R(reference_->xmat + 9 * id);
+      const Eigen::Map<const Vector3d> p(reference_->xpos + 3 * id);
+      const Pose X_BL = kinematics.CalcLinkPose(i);
+      R_engine_link_.emplace_back(R.transpose() * X_BL.linear());
+      p_engine_link_.emplace_back(R.transpose() * (X_BL.translation() - p));
+    }
+    R_engine_link_.emplace_back(Matrix3d::Identity());
+    p_engine_link_.emplace_back(Vector3d::Zero());
+  }
+
+  const Adapter* adapter_;
+  mjModel* engine_;
+  RobotSpec* plant_;
+  std::vector<std::string> names_;
+  MjDataPtr reference_;
+  std::vector<Matrix3d> R_engine_link_;
+  std::vector<Vector3d> p_engine_link_;
+};
+
+/// Gravity as a floor sees it that rises by these angles along x and y.
+Vector3d TiltGravity(const Vector3d& gravity, const Vector2d& slope) {
+  const Vector3d up = Vector3d(std::tan(slope.x()), std::tan(slope.y()), 1.0).normalized();
+  return -gravity.norm() * up;
+}
+
+void ScaleJoints(const MismatchOptions& options, const std::string& source, const Adapter& adapter,
+                 mjModel* engine, RobotSpec* plant) {
+  std::vector<std::string> names;
+  std::vector<int> dofs;
+  std::vector<double*> damping, armature;
+  if (adapter.wheels().size() == 2) {
+    // Both wheels are one thing in the model.
+    names.emplace_back("wheels");
+    dofs.push_back(-1);
+    damping.push_back(&plant->base.wheel.damping);
+    armature.push_back(&plant->base.wheel.armature);
+  }
+  for (size_t i = 0; i < plant->joints.size(); ++i) {
+    names.push_back(plant->joints[i].name);
+    dofs.push_back(adapter.joint_dofs()[i]);
+    damping.push_back(&plant->joints[i].damping);
+    armature.push_back(&plant->joints[i].armature);
+  }
+  const auto scale = [&](const ByName& factors, const std::vector<double*>& values, mjtNum* in_engine) {
+    const VectorXd by_name = factors.Resolve(names, source);
+    for (size_t i = 0; i < names.size(); ++i) {
+      const double factor = by_name[static_cast<Eigen::Index>(i)];
+      if (factor == 1.0) continue;
+      *values[i] *= factor;
+      if (dofs[i] >= 0) {
+        in_engine[dofs[i]] *= factor;
+      } else {
+        for (const EngineWheel& wheel : adapter.wheels()) in_engine[wheel.dof] *= factor;
+      }
+    }
+  };
+  scale(options.damping, damping, engine->dof_damping);
+  scale(options.armature, armature, engine->dof_armature);
+}
+
+/// Changes the engine's robot, and says of the change what the checks have to know: `plant` becomes what the
+/// engine's robot is now.
+/// @param adapter of the controller's model and `engine`, which is changed.
+void ApplyMismatch(const MismatchOptions& options, std::uint64_t seed, const std::string& source,
+                   const Adapter& adapter, mjModel* engine, RobotSpec* plant) {
+  Bodies bodies(adapter, engine, plant);
+  const VectorXd mass = options.mass.Resolve(bodies.names(), source);
+  const VectorXd within = options.mass_within.Resolve(bodies.names(), source);
+  const RandomStream stream(seed, "mismatch.mass_within");
+  for (Eigen::Index i = 0; i < mass.size(); ++i) {
+    const double factor = mass[i] * (1.0 + within[i] * stream.Symmetric(0, static_cast<std::uint64_t>(i)));
+    if (factor != 1.0) bodies.ScaleMass(static_cast<size_t>(i), factor);
+  }
+  for (const auto& [name, shift] : options.com) {
+    bodies.MoveCom(bodies.FindLink(name, "mismatch.com", source), shift);
+  }
+  for (const Payload& payload : options.payloads) {
+    bodies.AddPoint(bodies.FindLink(payload.body, payload.key + ".body", source), payload.mass, payload.at);
+  }
+  ScaleJoints(options, source, adapter, engine, plant);
+  if (options.friction) SetFingerFriction(*options.friction, engine);
+  if (!options.slope.isZero(0.0)) plant->gravity = TiltGravity(plant->gravity, options.slope);
+  std::copy_n(plant->gravity.data(), 3, engine->opt.gravity);
+
+  // The engine derives more from masses. The points of its bonds stay where they are.
+  const std::vector<mjtNum> bonds(engine->eq_data, engine->eq_data + mjNEQDATA * engine->neq);
+  const MjDataPtr data = MakeData(*engine);
+  mj_setConst(engine, data.get());
+  std::copy(bonds.begin(), bonds.end(), engine->eq_data);
+}
+
+}  // namespace
+
+void DeclareMismatch(const Scenario& scenario, const std::filesystem::path& mjcf, RobotPair* robots) {
+  const MismatchOptions& options = scenario.imperfections.mismatch;
+  if (options.is_none()) return;
+  const auto copy = [&] { return MjModelPtr(mj_copyModel(nullptr, robots->engine.get())); };
+  const auto change = [&](const RobotModel& model, mjModel* engine) {
+    RobotSpec spec = model.spec();
+    ApplyMismatch(options, scenario.seed, scenario.source, *robots->adapter, engine, &spec);
+    return RobotModel(std::move(spec));
+  };
+  MjModelPtr without = copy();
+  if (robots->rigid) *robots->rigid = change(*robots->rigid, copy().get());
+  RobotModel plant = change(robots->model, robots->engine.get());
+  robots->declared = std::make_unique<DeclaredMismatch>(std::move(plant), std::move(without), *robots->engine,
+                                                        robots->model, mjcf.string());
+}
 
 }  // namespace dexcheck

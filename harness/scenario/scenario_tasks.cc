@@ -93,19 +93,23 @@ void ReadWeight(TomlTable& control_table, ControlOptions* control) {
   table.RejectUnused();
 }
 
-constexpr std::pair<std::string_view, ControlLaw> kLaws[] = {
-    {"computed_torque", ControlLaw::kComputedTorque},
-    {"pd_gravity", ControlLaw::kPdGravity},
-    {"feedforward_pd", ControlLaw::kFeedforwardPd},
-    {"operational_space", ControlLaw::kOperationalSpace},
-    {"impedance", ControlLaw::kImpedance}};
+std::pair<std::string_view, ControlLaw> Named(ControlLaw law) { return {NameOf(law), law}; }
+
+/// @param laws that the task can have.
+void ReadLaw(TomlTable& table, std::initializer_list<std::pair<std::string_view, ControlLaw>> laws,
+             ControlOptions* control) {
+  const auto law = table.Find("law");
+  control->names_law = law.has_value();
+  if (law) control->law = law->AsChoice(laws);
+}
 
 /// The law, and the stiffness and damping of those that have them.
 void ReadLaw(TomlTable& table, ControlOptions* control) {
-  if (const auto law = table.Find("law")) {
-    control->law = law->AsChoice<ControlLaw>({kLaws[0], kLaws[1], kLaws[2], kLaws[3], kLaws[4]});
-    control->names_law = true;
-  }
+  using Law = ControlLaw;
+  ReadLaw(table,
+          {Named(Law::kComputedTorque), Named(Law::kPdGravity), Named(Law::kFeedforwardPd),
+           Named(Law::kOperationalSpace), Named(Law::kImpedance)},
+          control);
   const auto read = [&](const char* key, bool has_it, std::optional<Vector6d>* result) {
     const auto value = table.Find(key);
     if (!value) return;
@@ -212,11 +216,17 @@ JointNumbers ReadJointNumbers(TomlTable& table, const std::string& key) {
   return numbers;
 }
 
-/// When a way point is reached, after the one before.
-double ReadTime(TomlTable& table, double time_before) {
-  const TomlValue time = table.Get("time");
-  if (time.AsPositive() <= time_before) time.Fail("must be greater than the time before");
-  return time.AsPositive();
+/// Reads way points, each after the one before. @param read makes one at a time.
+template <typename Point, typename Read>
+void ReadPoints(TomlTable& table, const Read& read, std::vector<Point>* points) {
+  for (const TomlValue& entry : ListEntries(table, "points")) {
+    TomlTable point = entry.AsTable();
+    const TomlValue time = point.Get("time");
+    if (time.AsPositive() <= (points->empty() ? 0.0 : points->back().time))
+      time.Fail("must be greater than the time before");
+    points->push_back(read(point, time.AsPositive()));
+    point.RejectUnused();
+  }
 }
 
 /// Amplitude, frequency and ramp. @param missing the amplitude's key, where it has none.
@@ -253,13 +263,12 @@ JointTask ReadJointMotion(const TomlValue& value) {
   TomlTable table = value.AsTable();
   JointTask task;
   task.start = ReadJointNumbers(table, "start");
-  for (const TomlValue& entry : ListEntries(table, "points")) {
-    TomlTable point = entry.AsTable();
-    const double time = ReadTime(point, task.points.empty() ? 0.0 : task.points.back().time);
-    task.points.push_back({time, ReadJointNumbers(point, "joints")});
-    if (task.points.back().where.key.empty()) point.Miss("joints_deg");
-    point.RejectUnused();
-  }
+  const auto read = [](TomlTable& point, double time) -> JointTask::Point {
+    JointNumbers joints = ReadJointNumbers(point, "joints");
+    if (joints.key.empty()) point.Miss("joints_deg");
+    return {time, std::move(joints)};
+  };
+  ReadPoints(table, read, &task.points);
   for (const TomlValue& entry : ListEntries(table, "oscillations"))
     task.oscillations.push_back(ReadOscillation(entry));
   table.RejectUnused();
@@ -291,14 +300,10 @@ StanceTask ReadStance(const TomlValue& value) {
   (void)table.Get("f_max");
   ReadKeys<Options>(table, {POSITIVE_KEY(mu), KEY(f_min), POSITIVE_KEY(f_max)}, &task);
   if (task.f_max <= task.f_min) table.Get("f_max").Fail("must be greater than f_min");
-  for (const TomlValue& entry : ListEntries(table, "points")) {
-    TomlTable point = entry.AsTable();
-    const double time = ReadTime(point, task.points.empty() ? 0.0 : task.points.back().time);
-    VectorXd& to = task.points.emplace_back(JointWayPoint{time, VectorXd::Zero(6)}).q;
-    if (const auto xyz = point.Find("xyz")) to.head<3>() = xyz->AsVector<3>();
-    if (const auto angles = point.FindAngles<3>("rpy")) to.tail<3>() = *angles;
-    point.RejectUnused();
-  }
+  const auto read = [](TomlTable& point, double time) -> JointWayPoint {
+    return {time, ReadCoordinates(point, "xyz", "rpy")};
+  };
+  ReadPoints(table, read, &task.points);
   for (const TomlValue& entry : ListEntries(table, "oscillations"))
     task.oscillations.push_back(ReadStanceOscillation(entry));
   table.RejectUnused();
@@ -307,10 +312,8 @@ StanceTask ReadStance(const TomlValue& value) {
 
 void ReadJointControl(const TomlValue& value, ControlOptions* control, JointTask* task) {
   TomlTable table = value.AsTable();
-  if (const auto law = table.Find("law")) {
-    control->law = law->AsChoice<ControlLaw>({kLaws[0], kLaws[1], kLaws[2]});
-    control->names_law = true;
-  }
+  using Law = ControlLaw;
+  ReadLaw(table, {Named(Law::kComputedTorque), Named(Law::kPdGravity), Named(Law::kFeedforwardPd)}, control);
   // Nothing is X_o here.
   control->orientation = OrientationFeedback::kRotation;
   (void)table.Get("natural_frequency");
@@ -366,8 +369,7 @@ void ReadTask(TomlTable& root, Scenario* scenario) {
   TrajectoryTask task;
   if (const auto error = root.Find("start_error")) {
     TomlTable table = error->AsTable();
-    if (const auto xyz = table.Find("xyz")) task.start_error.head<3>() = xyz->AsVector<3>();
-    if (const auto zyz = table.FindAngles<3>("zyz")) task.start_error.tail<3>() = *zyz;
+    task.start_error = ReadCoordinates(table, "xyz", "zyz");
     table.RejectUnused();
   }
   TomlTable table = trajectory->AsTable();

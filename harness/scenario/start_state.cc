@@ -43,19 +43,9 @@ ModelTerms MakeKinematics(const RobotModel& model, const VectorXd& q) {
 VectorXd ReadPosture(const Scenario& scenario, const RobotModel& model) {
   VectorXd q = VectorXd::Zero(model.num_positions());
   for (const auto& [name, angle] : scenario.grasp.joints) {
-    const int joint = model.FindJoint(name);
-    if (joint < 0) Fail(scenario, "grasp.joints_deg", Quote(name) + " is no joint of the model");
-    q[model.num_base_positions() + joint] = angle;
+    q[model.num_base_positions() + RequireJoint(scenario, "grasp.joints_deg", model, name)] = angle;
   }
   return q;
-}
-
-int FindGraspFrame(const Scenario& scenario, const RobotModel& model) {
-  try {
-    return model.FindFrame(scenario.grasp.frame);
-  } catch (const std::invalid_argument&) {
-    Fail(scenario, "grasp.frame", Quote(scenario.grasp.frame) + " is no frame of the model");
-  }
 }
 
 void VaryGrasp(const Surface& surface, std::mt19937_64* random, GraspOptions* grasp) {
@@ -94,7 +84,8 @@ FingerPlacement PlaceFingers(const Scenario& scenario, const RobotModel& model, 
                              const Hold& hold, StartState* start) {
   const GraspOptions& grasp = scenario.grasp;
   const VectorXd q = ReadPosture(scenario, model);
-  PlaceObject(MakeKinematics(model, q).CalcFramePose(FindGraspFrame(scenario, model)) * grasp.X_FO, start);
+  const int frame = RequireFrame(scenario, "grasp.frame", model, grasp.frame);
+  PlaceObject(MakeKinematics(model, q).CalcFramePose(frame) * grasp.X_FO, start);
   if (scenario.control.orientation == OrientationFeedback::kAngles &&
       std::abs(std::sin(start->X_o[4])) < kMinSinBeta) {
     Fail(scenario, "control.orientation",
@@ -107,6 +98,23 @@ FingerPlacement PlaceFingers(const Scenario& scenario, const RobotModel& model, 
 }
 
 }  // namespace
+
+int RequireJoint(const Scenario& scenario, const std::string& key, const RobotModel& model,
+                 const std::string& name) {
+  if (const int joint = model.FindJoint(name); joint >= 0) return joint;
+  std::vector<std::string> names;
+  for (const Joint& one : model.joints()) names.push_back(one.name);
+  Fail(scenario, key, Quote(name) + " is no joint of the model" + SuggestInBrackets(name, names, ""));
+}
+
+int RequireFrame(const Scenario& scenario, const std::string& key, const RobotModel& model,
+                 const std::string& name) {
+  try {
+    return model.FindFrame(name);
+  } catch (const std::invalid_argument&) {
+    Fail(scenario, key, Quote(name) + " is no frame of the model");
+  }
+}
 
 double DrawSymmetric(std::mt19937_64* random) { return 2.0 * DrawUnit(random) - 1.0; }
 
@@ -185,17 +193,14 @@ StartState PlacePickTask(const RobotModel& model, const Surface& surface, Hold* 
     X_Bo.linear() = Eigen::AngleAxisd(kPi * DrawSymmetric(&random), Vector3d::UnitZ()) * X_Bo.linear();
   }
   hand.fingertips = hold->fingertips;
-  hand.palm_frame = FindGraspFrame(*scenario, model);
+  hand.palm_frame = RequireFrame(*scenario, "grasp.frame", model, scenario->grasp.frame);
   std::vector<SurfacePoint>& contacts = task.pick_and_place.plan.contacts;
   contacts.clear();
   for (const SurfacePoint& contact : scenario->grasp.contacts) {
     contacts.push_back(PointAtAngles(surface, contact.u, contact.v));
   }
-  for (const std::string& name : task.arm_joints) {
-    const int joint = model.FindJoint(name);
-    if (joint < 0) Fail(*scenario, "task.arm_joints", Quote(name) + " is no joint of the model");
-    hand.arm_joints.push_back(joint);
-  }
+  for (const std::string& name : task.arm_joints)
+    hand.arm_joints.push_back(RequireJoint(*scenario, "task.arm_joints", model, name));
   if (hand.arm_joints.empty()) hand.arm_joints = ListArmJoints(model, hold->fingertips, hand.palm_frame);
   start.q = ReadPosture(*scenario, model);
   PlaceObject(task.X_Bo, &start);

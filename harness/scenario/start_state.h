@@ -37,6 +37,13 @@ struct StartState {
 /// A pose and its coordinates.
 void PlaceObject(const Pose& X_Bo, StartState* start);
 
+/// The model's joint or frame of this name. @param key of the scenario, for messages. @throws InputError for
+/// one that is none.
+int RequireJoint(const Scenario& scenario, const std::string& key, const RobotModel& model,
+                 const std::string& name);
+int RequireFrame(const Scenario& scenario, const std::string& key, const RobotModel& model,
+                 const std::string& name);
+
 /// The next random number from -1 to 1.
 double DrawSymmetric(std::mt19937_64* random);
 

@@ -14,7 +14,6 @@
 #include "controller/control/grasp_terms.h"
 #include "controller/control/trajectory.h"
 #include "controller/model/platform.h"
-#include "harness/base/byte_archive.h"
 #include "harness/base/process_pool.h"
 #include "harness/checks/step_record.h"
 #include "harness/plant/disturbances.h"
@@ -193,17 +192,13 @@ Measured RunOnce(const Setup& setup, const std::vector<std::unique_ptr<ErrorPred
 }
 
 ErrorSize CalcSize(const Errors& errors, size_t from, bool of_joints) {
-  ErrorSize size;
-  double squares = 0.0;
-  const size_t count = errors.CountSteps();
-  for (size_t i = from; i < count; ++i) {
+  ErrorStatistics lengths;
+  for (size_t i = from; i < errors.CountSteps(); ++i) {
     const auto error = errors.At(i);
     const double length = of_joints ? error.cwiseAbs().maxCoeff() : error.norm();
-    squares += length * length;
-    size.max = std::max(size.max, length);
+    lengths.Add(length, length * length);
   }
-  if (count > from) size.rms = std::sqrt(squares / static_cast<double>(count - from));
-  return size;
+  return {lengths.rms(), lengths.max};
 }
 
 /// a + sign b, as far as both go.

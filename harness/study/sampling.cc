@@ -6,7 +6,6 @@
 #include <boost/math/special_functions/beta.hpp>
 #include <boost/random/sobol.hpp>
 #include <cmath>
-#include <limits>
 #include <numeric>
 #include <random>
 

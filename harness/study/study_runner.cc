@@ -10,7 +10,6 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
-#include "harness/base/byte_archive.h"
 #include "harness/engine/machine.h"
 #include "harness/study/search.h"
 

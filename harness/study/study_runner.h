@@ -4,8 +4,6 @@
 // but memory is left of a trial in its process, so that rows do not depend on who made them.
 
 #include <functional>
-#include <map>
-#include <optional>
 #include <vector>
 
 #include "harness/base/process_pool.h"

@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <limits>
 #include <new>
-#include <utility>
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"

@@ -13,7 +13,6 @@
 #include <stdexcept>
 
 #include "controller/common/errors.h"
-#include "harness/base/byte_archive.h"
 #include "tests/common/matchers.h"
 #include "tests/common/throws.h"
 

@@ -136,7 +136,7 @@ explain_all() {
 total=0
 mapfile -t readers < <(find "$root/harness" -name 'scenario*.cc' -o -name 'scenario*.h' | sort)
 explain_all "$document" 80 "${readers[@]}" "$root/controller/control/trajectory.cc"
-explain_all "$root/harness/shipped/studies/README.md" 35 "$root/harness/study/study_reader.cc" "$root/harness/study/objective.h"
+explain_all "$root/harness/shipped/studies/README.md" 35 "$root/harness/study/study.cc" "$root/harness/study/objective.h"
 
 [[ $status -ne 0 ]] || echo "$count keys of the document are accepted, $total of the readers are explained"
 exit $status
