@@ -1,6 +1,10 @@
 #include "controller/common/linear_algebra.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "controller/common/errors.h"
+#include "controller/common/text.h"
 
 namespace dexcheck {
 
@@ -23,6 +27,18 @@ void DecomposeGeneralized(const Matrix6d& K, const Matrix6d& Lambda, Vector6d* v
   const Eigen::GeneralizedSelfAdjointEigenSolver<Matrix6d> solver(K, Lambda);
   *values = solver.eigenvalues();
   *vectors = solver.eigenvectors();
+}
+
+void FactorIndependent(const Eigen::Ref<const MatrixXd>& A, const char* problem, Eigen::LLT<MatrixXd>* llt) {
+  constexpr double kMinPivotRatio = 1e-8;
+  double smallest = 0.0;
+  llt->compute(A);
+  if (llt->info() == Eigen::Success) {
+    const auto pivots = llt->matrixLLT().diagonal().array();
+    smallest = std::min(1.0, (pivots.square() / A.diagonal().array()).minCoeff());
+  }
+  if (smallest > kMinPivotRatio) return;
+  throw SingularityError(problem + (", smallest independent part " + FormatNumber(smallest)), smallest);
 }
 
 LeastSquares::LeastSquares(double independent) {

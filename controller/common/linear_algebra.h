@@ -3,6 +3,7 @@
 // Decompositions that many need: each is compiled once, here. Those of matrices of any size allocate, and are
 // for what is not done at every step of control.
 
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <numeric>
 #include <span>
@@ -38,6 +39,12 @@ void DecomposeSymmetric(const Matrix6d& S, Vector6d* values, Matrix6d* vectors);
 /// K v = k Lambda v with v^T Lambda v = 1: k ascending and the v as columns, of K symmetric and Lambda
 /// symmetric and positive definite. Allocates nothing.
 void DecomposeGeneralized(const Matrix6d& K, const Matrix6d& Lambda, Vector6d* values, Matrix6d* vectors);
+
+/// Factors a symmetric matrix J W^-1 J^T of constraints, whose lower triangle is read. Allocates nothing
+/// where the sizes fit.
+/// @throws SingularityError "PROBLEM, smallest independent part ..." when a pivot is below 1e-8 of its
+/// diagonal entry: a constraint of which less is independent of the others loses half of its digits or more.
+void FactorIndependent(const Eigen::Ref<const MatrixXd>& A, const char* problem, Eigen::LLT<MatrixXd>* llt);
 
 /// A matrix of any shape and rank, decomposed for several right-hand sides.
 class LeastSquares {

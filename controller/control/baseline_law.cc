@@ -1,12 +1,10 @@
 #include "controller/control/baseline_law.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "controller/common/errors.h"
 #include "controller/common/linear_algebra.h"
-#include "controller/common/text.h"
 
 namespace dexcheck {
 
@@ -28,19 +26,7 @@ void ObjectSpaceInertia::Compute(const ModelTerms& robot, const GraspTerms& gras
   for (const int i : grasp.moving_entries()) half_.row(i).head(k) = grasp.J_B().col(i).transpose();
   factor_.SolveTransposedColumns(grasp.moving_entries(), half_);
   CalcGramMatrix(half_, grasp.moving_entries(), &inverse_);
-  inverse_llt_.compute(inverse_.topLeftCorner(k, k));
-  double smallest = inverse_llt_.info() == Eigen::Success ? 1.0 : 0.0;
-  for (Eigen::Index i = 0; smallest > 0.0 && i < k; ++i) {
-    const double pivot = inverse_llt_.matrixLLT()(i, i);
-    smallest = std::min(smallest, pivot * pivot / inverse_(i, i));
-  }
-  // Smallest pivot of Lambda_c^-1, relative to its diagonal entry, that counts as regular; the value of
-  // ConstrainedDynamics.
-  constexpr double kMinPivotRatio = 1e-8;
-  if (!(smallest > kMinPivotRatio)) {
-    throw SingularityError("J_B' has not full row rank, smallest independent part " + FormatNumber(smallest),
-                           smallest);
-  }
+  FactorIndependent(inverse_.topLeftCorner(k, k), "J_B' has not full row rank", &inverse_llt_);
   // G Lambda_c G^T = (L_c^-1 G^T)^T (L_c^-1 G^T)
   G_T_ = grasp.G().transpose();
   inverse_llt_.matrixL().solveInPlace(G_T_);

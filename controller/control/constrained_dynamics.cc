@@ -3,28 +3,10 @@
 #include <algorithm>
 
 #include "controller/common/errors.h"
-#include "controller/common/text.h"
+#include "controller/common/linear_algebra.h"
 
 namespace dexcheck {
 namespace {
-
-// Smallest pivot of the Schur complement, against its diagonal entry, that counts as regular: a constraint of
-// which less than this is independent of the others loses half of its digits or more.
-constexpr double kMinPivotRatio = 1e-8;
-
-/// @param schur k x k.
-void FactorIndependentConstraints(const Eigen::Ref<const MatrixXd>& schur, Eigen::LLT<MatrixXd>* llt) {
-  double smallest = 0.0;
-  llt->compute(schur);
-  if (llt->info() == Eigen::Success) {
-    const auto pivots = llt->matrixLLT().diagonal().array();
-    smallest = std::min(1.0, (pivots.square() / schur.diagonal().array()).minCoeff());
-  }
-  if (smallest > kMinPivotRatio) return;
-  throw SingularityError(
-      "contact constraints depend on each other, smallest independent part " + FormatNumber(smallest),
-      smallest);
-}
 
 // Pivots of L^-T J^T below this, against the largest, are rounding: constraints that others hold already.
 constexpr double kRedundant = 1e-8;
@@ -82,7 +64,7 @@ const Prediction& ConstrainedDynamics::Predict(const ModelTerms& robot, const Gr
   prediction_.f_c = grasp.slip_bias();
   if (contact_acceleration != nullptr) prediction_.f_c -= *contact_acceleration;
   for (const int i : rows_) prediction_.f_c += motion_[i] * half_.row(i).head(k).transpose();
-  FactorIndependentConstraints(schur_.topLeftCorner(k, k), &schur_llt_);
+  FactorIndependent(schur_.topLeftCorner(k, k), "contact constraints depend on each other", &schur_llt_);
   schur_llt_.solveInPlace(prediction_.f_c);
 
   // [xi_dot; V_Bo_dot] = M^-1/2 (M^-1/2 force - half f_c)

@@ -144,10 +144,7 @@ Hold FindHold(const Scenario& scenario, const RobotModel& model) {
   }
   std::vector<int> users(static_cast<size_t>(model.num_joints()), 0);
   for (const int tip : fingertips) {
-    int joint = model.frame(tip).link;
-    for (; joint >= 0; joint = model.joints()[static_cast<size_t>(joint)].parent) {
-      ++users[static_cast<size_t>(joint)];
-    }
+    for (const int joint : model.ListChain(model.frame(tip).link)) ++users[static_cast<size_t>(joint)];
   }
   for (int i = 0; i < model.num_joints(); ++i) {
     if (users[static_cast<size_t>(i)] == 0 && scenario.joint_task() == nullptr) hold.idle_joints.push_back(i);
