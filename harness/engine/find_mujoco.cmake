@@ -2,10 +2,7 @@
 # release (include/, lib/) or the folder `mujoco` of a pip installation (include/, libmujoco.so.VERSION).
 set(DEXCHECK_MUJOCO "" CACHE PATH "Folder of a MuJoCo release, instead of the system's 2.2.2")
 if(NOT DEXCHECK_MUJOCO)
-  find_package(mujoco REQUIRED)
-  if(NOT mujoco_VERSION VERSION_EQUAL 2.2.2)
-    message(FATAL_ERROR "MuJoCo 2.2.2 is needed, found ${mujoco_VERSION}")
-  endif()
+  find_package(mujoco 2.2.2 EXACT REQUIRED)
   return()
 endif()
 file(GLOB libraries ${DEXCHECK_MUJOCO}/lib/libmujoco.so.* ${DEXCHECK_MUJOCO}/libmujoco.so.*)

@@ -1,3 +1,13 @@
+# Target `reference`: pages of all installed headers, in reference/html of the build folder. A warning is an error.
+find_program(DEXCHECK_DOXYGEN doxygen)
+if(DEXCHECK_DOXYGEN)
+  get_property(DOXYGEN_INPUT GLOBAL PROPERTY DEXCHECK_INSTALLED_FOLDERS)
+  list(JOIN DOXYGEN_INPUT " " DOXYGEN_INPUT)
+  configure_file(${CMAKE_CURRENT_LIST_DIR}/Doxyfile.in ${PROJECT_BINARY_DIR}/Doxyfile @ONLY)
+  add_custom_target(reference COMMAND ${DEXCHECK_DOXYGEN} ${PROJECT_BINARY_DIR}/Doxyfile
+    COMMENT "Pages of the installed headers: ${PROJECT_BINARY_DIR}/reference/html/index.html" VERBATIM)
+endif()
+
 # What find_package(dexcheck) reads, the Debian packages (cpack in the build folder): dexcheck is the program with its
 # shipped files, libdexcheck-dev the libraries with their headers; and the archive that runs from wherever it is unpacked.
 include(CMakePackageConfigHelpers)
@@ -6,8 +16,7 @@ configure_package_config_file(${CMAKE_CURRENT_LIST_DIR}/dexcheckConfig.cmake.in
   ${PROJECT_BINARY_DIR}/dexcheckConfig.cmake INSTALL_DESTINATION ${package_folder})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/dexcheckConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/dexcheckConfig.cmake ${PROJECT_BINARY_DIR}/dexcheckConfigVersion.cmake
-  ${CMAKE_CURRENT_LIST_DIR}/dexcheckConsistencyTest.cmake
-  DESTINATION ${package_folder} COMPONENT development)
+  ${CMAKE_CURRENT_LIST_DIR}/dexcheckConsistencyTest.cmake DESTINATION ${package_folder} COMPONENT development)
 install(EXPORT dexcheckController NAMESPACE dexcheck:: DESTINATION ${package_folder} COMPONENT development)
 if(DEXCHECK_BUILD_HARNESS)
   install(EXPORT dexcheckHarness NAMESPACE dexcheck:: DESTINATION ${package_folder} COMPONENT development)

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """A run's log read by h5py, without a manual: every dataset has a unit, a description and names that fit its columns.
 
 h5py_test.py DEXCHECK; exit code 77 without h5py.

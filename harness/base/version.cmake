@@ -1,4 +1,4 @@
-# Writes OUT, the source that defines kGitRevision, when it would change: cmake -DOUT=... -DSOURCE=... -P this
+# Writes OUT, the source of version.h, when it would change: cmake -DOUT=... -DSOURCE=... -DVERSION=... -P this
 find_program(git git)
 set(revision "")
 if(git AND EXISTS ${SOURCE}/.git)
@@ -6,8 +6,6 @@ if(git AND EXISTS ${SOURCE}/.git)
     OUTPUT_VARIABLE revision OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
 endif()
 file(CONFIGURE OUTPUT ${OUT} CONTENT [[#include "harness/base/version.h"
-
-namespace dexcheck {
-const char* const kGitRevision = "@revision@";
-}  // namespace dexcheck
+const char* dexcheck::Version() { return "@VERSION@"; }
+const char* const dexcheck::kGitRevision = "@revision@";
 ]] @ONLY)

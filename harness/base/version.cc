@@ -1,7 +1,0 @@
-#include "harness/base/version.h"
-
-namespace dexcheck {
-
-const char* Version() { return DEXCHECK_VERSION; }
-
-}  // namespace dexcheck
