@@ -119,6 +119,32 @@ bool IsBetter(const TriedReading& one, const TriedReading& other) {
   return LeavesLess(a, b, kMuch, kMuchOfNumber * static_cast<double>(more));
 }
 
+/// Adds what was found of a joint's offset to what was undone of it. @return whether there is any.
+bool AddFound(const RecordingJudgement& judgement, std::vector<NonlinearFault>* faults) {
+  bool has_any = false;
+  for (NonlinearFault& undone : *faults) {
+    for (const FoundFault& one : judgement.found) {
+      if (one.fault.kind != TorqueFault::kZero || one.fault.index != undone.joint ||
+          undone.number != NonlinearFault::Number::kOffset)
+        continue;
+      undone.offset -= one.amplitude[0];
+      undone.fault.value += one.amplitude[0];
+      has_any = true;
+    }
+  }
+  return has_any;
+}
+
+/// Whether a gain of positions was undone that is found once more: the two cancel each other.
+bool HasGainTwice(const TriedReading& reading) {
+  return std::ranges::any_of(reading.faults, [&](const NonlinearFault& undone) {
+    return undone.number == NonlinearFault::Number::kGain &&
+           std::ranges::any_of(reading.judgement.found, [&](const FoundFault& one) {
+             return one.fault.kind == TorqueFault::kPositionGain && one.fault.index == undone.joint;
+           });
+  });
+}
+
 RobotModel Correct(const RobotModel& model, const std::vector<NonlinearFault>& faults) {
   RobotSpec spec = model.spec();
   for (const NonlinearFault& fault : faults) fault.Undo(&spec);
@@ -212,13 +238,15 @@ class Readings {
       now.faults.push_back(*fault);
       if (!Reopen(now.faults)) return;
       now.judgement = Judge(now.faults, refinements_);
+      if (AddFound(now.judgement, &now.faults) && Reopen(now.faults))
+        now.judgement = Judge(now.faults, refinements_);
       // A wrong geometry always explains a part of something.
       if (of_model) Refine(&now);
       // Fewer numbers than before, or none at all.
       const long others = CountNumbers(now.judgement);
       const bool replaces_others = now.judgement.IsWhole() && (others < CountNumbers(*best) ||
                                                                (others == 0 && !best->judgement.IsWhole()));
-      const bool is_better = (!of_model || replaces_others) && IsBetter(now, *best);
+      const bool is_better = (!of_model || replaces_others) && !HasGainTwice(now) && IsBetter(now, *best);
       if (is_better) *best = now;
       if (of_model || (!is_better && fault->number != NonlinearFault::Number::kNone)) return;
     }

@@ -377,6 +377,9 @@ bool TorqueEstimator::LowerNoise() {
   if (!by_causes.IsBeatenBy(PredictByAll(held), by_causes.numbers > 0)) return false;
   const VectorXd left = held.CalcLeft(FitAmplitudes(Part::kPlain, nullptr));
   for (const TorqueRows::Part& part : held.parts) {
+    // Friction that holds a joint is known to its own size.
+    const auto joint = static_cast<size_t>(recordings_->joints()[part.place]);
+    if (!(*recordings_)[part.recording].motion.moves[joint]) continue;
     const double rms = recordings_->weight(part.recording, part.place) *
                        left.segment(part.begin, part.size).norm() / std::sqrt(std::max(1.0, part.samples));
     double& noise = recordings_->noise(part.recording, part.place);
