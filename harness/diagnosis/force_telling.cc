@@ -66,7 +66,7 @@ double CalcGrowthBegin(const VectorXd& a, double end) {
 Fault MakeForceFault(const Candidate& candidate, const VectorXd& amplitude, const VectorXd& error,
                      const RobotModel& model) {
   const Vector3d& gravity = model.gravity();
-  // What is no link has its own axes.
+  // A body that is no link has its own axes.
   Matrix3d R_Li = Matrix3d::Identity();
   for (const Joint& one : model.joints())
     if (candidate.place == "link " + one.link) R_Li = one.R_iL.transpose();

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "controller/common/linear_algebra.h"
-#include "harness/diagnosis/line_search.h"
+#include "harness/diagnosis/sine_fit.h"
 
 namespace dexcheck {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "controller/common/errors.h"
-#include "harness/diagnosis/line_search.h"
+#include "harness/diagnosis/sine_fit.h"
 
 namespace dexcheck {
 namespace {

@@ -108,7 +108,7 @@ class Judge {
     Refine(after);
   }
 
-  /// Of friction at low speed and of a base that shakes, velocity and frequency are sought on what was found.
+  /// Refines the velocity of friction at low speed, and the frequency of a base that shakes.
   void Refine(const VectorXd& left) {
     Refinements& next = result_.refinements;
     next.shaking = set_.refinements().shaking;
