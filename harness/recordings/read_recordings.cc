@@ -27,7 +27,10 @@ RobotModel AddPayload(const RobotModel& model, const std::optional<DeclaredPaylo
 
 RecordingSet::RecordingSet(const RobotModel& model, std::vector<Recording>* recordings,
                            const ReadOptions& options, const std::function<bool(long rows)>& on_rows)
-    : model_(&model), first_name_(recordings->front().name), refinements_(options.refinements), frames_(options.frames) {
+    : model_(&model),
+      first_name_(recordings->front().name),
+      refinements_(options.refinements),
+      frames_(options.frames) {
   for (const Recording& recording : *recordings)
     if (model.base().type != BaseType::kFixed && !recording.Has(RecordedQuantity::kBase))
       throw InputError(model.spec().source + ": base: moves; " + recording.name +
