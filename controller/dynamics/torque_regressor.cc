@@ -1,5 +1,7 @@
 #include "controller/dynamics/torque_regressor.h"
 
+#include "controller/common/linear_algebra.h"
+
 namespace dexcheck {
 namespace {
 
@@ -48,12 +50,7 @@ MassProperties TorqueRegressor::Unpack(const BodyVector& vector) {
   MassProperties body;
   body.mass = vector[0];
   if (body.mass != 0.0) body.com = vector.segment<3>(1) / body.mass;
-  // clang-format off
-  body.inertia << vector[4], vector[7], vector[8],
-                  vector[7], vector[5], vector[9],
-                  vector[8], vector[9], vector[6];
-  // clang-format on
-  body.inertia -= CalcPointInertia(body.mass, body.com);
+  body.inertia = ToTensor(vector.tail<6>()) - CalcPointInertia(body.mass, body.com);
   return body;
 }
 
@@ -148,6 +145,34 @@ void TorqueRegressor::CalcForceColumns(int link, Eigen::Ref<MatrixXd> columns) c
       columns.row(j).head<3>() = -z.transpose();
     }
   }
+}
+
+Eigen::Matrix4d CalcPseudoInertia(const TorqueRegressor::BodyVector& body) {
+  const Matrix3d I = ToTensor(body.tail<6>());
+  Eigen::Matrix4d pseudo;
+  // The second moments are half the trace of I less I.
+  pseudo << 0.5 * I.trace() * Matrix3d::Identity() - I, body.segment<3>(1), body.segment<3>(1).transpose(),
+      body[0];
+  return pseudo;
+}
+
+bool IsBody(const TorqueRegressor::BodyVector& body) {
+  constexpr double kRounding = 1e-9;
+  const Eigen::Matrix4d pseudo = CalcPseudoInertia(body);
+  return body[0] > 0.0 && CalcSymmetricEigenvalues(pseudo)[0] >= -kRounding * pseudo.trace();
+}
+
+TorqueRegressor::BodyVector FindNearestBody(const TorqueRegressor::BodyVector& body) {
+  const SymmetricEigen eigen = DecomposeSymmetric(CalcPseudoInertia(body));
+  // No thinner than readers of descriptions take for a body.
+  constexpr double kThinnest = 1e-6;
+  const VectorXd possible = eigen.values.cwiseMax(kThinnest * eigen.values.cwiseAbs().maxCoeff());
+  const Eigen::Matrix4d pseudo = eigen.vectors * possible.asDiagonal() * eigen.vectors.transpose();
+  const Matrix3d moments = pseudo.topLeftCorner<3, 3>();
+  TorqueRegressor::BodyVector nearest;
+  nearest << pseudo(3, 3), pseudo.topRightCorner<3, 1>(),
+      ToEntries(moments.trace() * Matrix3d::Identity() - moments);
+  return nearest;
 }
 
 }  // namespace dexcheck

@@ -75,4 +75,12 @@ class TorqueRegressor {
   VectorXd qdd_;
 };
 
+/// The pseudo-inertia of a body (4 x 4): its second moments about the frame's origin, mass times centre, and
+/// mass. That of every body that fills a volume is positive definite.
+Eigen::Matrix4d CalcPseudoInertia(const TorqueRegressor::BodyVector& body);
+/// Whether there is a body of such mass, centre and inertia.
+bool IsBody(const TorqueRegressor::BodyVector& body);
+/// The nearest one that there is: of least distance between pseudo-inertias.
+TorqueRegressor::BodyVector FindNearestBody(const TorqueRegressor::BodyVector& body);
+
 }  // namespace dexcheck

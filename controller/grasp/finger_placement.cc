@@ -103,7 +103,6 @@ FramePlacement SolveFramePlacement(const RobotModel& model, int frame, const Pos
   result.q = q;
   chain.Scatter(best.q, result.q);
   result.position_residual = best.position;
-  result.orientation_residual = best.orientation;
   result.joint_margin = chain.range().CalcMargin(best.q);
   result.reached = best.reached;
   return result;

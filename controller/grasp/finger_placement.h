@@ -47,11 +47,10 @@ struct FramePlacementOptions {
 };
 
 struct FramePlacement {
-  VectorXd q;                         ///< q' with `joints` solved, the others as given.
-  double position_residual = 0.0;     ///< Distance of the frame's origin from its place, m.
-  double orientation_residual = 0.0;  ///< Angle between the frame and its pose, rad.
-  double joint_margin = 0.0;          ///< Smallest distance of one of the joints from the ends of its range.
-  bool reached = false;               ///< Within the tolerance and the joint margin.
+  VectorXd q;                      ///< q' with `joints` solved, the others as given.
+  double position_residual = 0.0;  ///< Distance of the frame's origin from its place, m.
+  double joint_margin = 0.0;       ///< Smallest distance of one of the joints from the ends of its range.
+  bool reached = false;            ///< Within the tolerance and the joint margin.
 };
 
 /// Moves some joints until a frame of the model is at a pose, six equations. With more joints than needed the

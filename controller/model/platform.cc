@@ -66,8 +66,6 @@ Matrix2d CalcWheelRateMap(const Base& base) {
   return W;
 }
 
-Vector2d CalcWheelRates(const Base& base, const Vector2d& v) { return CalcWheelRateMap(base) * v; }
-
 ActuationMap::ActuationMap(const RobotModel& model)
     : size_(model.num_velocities()),
       has_wheels_(model.base().type == BaseType::kDifferentialDrive),

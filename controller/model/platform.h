@@ -31,9 +31,6 @@ PlatformConstraint CalcPlatformConstraint(const Base& base, const Vector3d& q_v,
 /// @throws as CalcPlatformConstraint.
 Matrix2d CalcWheelRateMap(const Base& base);
 
-/// Wheel rates [thetadot_r; thetadot_l], rad/s, from v. Throws as CalcPlatformConstraint.
-Vector2d CalcWheelRates(const Base& base, const Vector2d& v);
-
 /// E_bar' of (17), (18) = diag(S_v^T E_v, 1): torques tau' (n; first [tau_r; tau_l] of the wheels) to forces
 /// on xi, and back. Constant; for other bases the identity, but that nothing drives a floating one: its six
 /// entries of tau' are zero.

@@ -1,10 +1,11 @@
 #pragma once
 
-// Elements of ranges by their values.
+// Elements of ranges by their values, and their median.
 
 #include <algorithm>
 #include <functional>
 #include <iterator>
+#include <vector>
 
 namespace dexcheck {
 
@@ -31,6 +32,14 @@ template <typename Range, typename Value, typename Projection = std::identity>
 template <typename Range, typename Vector>
 void Append(const Range& more, Vector* all) {
   all->insert(all->end(), std::ranges::begin(more), std::ranges::end(more));
+}
+
+/// The middle one, of an even number the larger one; 0 of none.
+inline double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 }  // namespace dexcheck

@@ -206,7 +206,7 @@ class JudgedJointLaw final : public JudgedLaw {
         0.0;
   }
   [[nodiscard]] bool demands_acceleration() const override { return law_ == ControlLaw::kComputedTorque; }
-  [[nodiscard]] VectorXd CalcForce(LawInputs inputs) override {
+  [[nodiscard]] VectorXd CalcForce(const LawInputs& inputs) override {
     const LawTerms& terms = inputs.Link();
     desired_ = inputs.now.joints;
     position_error_ = inputs.now.position_error;

@@ -67,7 +67,7 @@ class JudgedLaw {
   /// The inputs of a step, with the force of the right law: empty where it has none.
   [[nodiscard]] LawInputs MakeInputs(const StepRecord& step, const LawTerms& terms);
   /// E_bar' tau' (n); empty where these inputs have none.
-  [[nodiscard]] virtual VectorXd CalcForce(LawInputs inputs) = 0;
+  [[nodiscard]] virtual VectorXd CalcForce(const LawInputs& inputs) = 0;
   [[nodiscard]] virtual std::span<const LawPartName> ListParts() const = 0;
   /// "K_p of x".
   [[nodiscard]] const std::vector<std::string>& gains() const { return gain_names_; }

@@ -30,7 +30,7 @@ struct LawStep {
 /// All that the force is computed from. Changes of it are faults of the law.
 struct LawInputs {
   LawStep now;
-  LawTerms terms;                       ///< Its pointers are set by Link.
+  mutable LawTerms terms;               ///< Its pointers are set by Link.
   MatrixXd M, C, J_dot;                 ///< M_bar', C_bar' (n x n), J_B_dot' (3N x n).
   Matrix6Xd G_dot;                      ///< 6 x 3N
   VectorXd F_N;                         ///< Internal force (3N).
@@ -43,7 +43,8 @@ struct LawInputs {
 
   bool exchanges_force_axes = false;  ///< Tangential axes of each contact force are exchanged.
 
-  LawTerms& Link() {
+  /// Returns the terms with pointers to this object's own matrices.
+  const LawTerms& Link() const {
     terms.M = &M;
     terms.C = &C;
     terms.J_dot = &J_dot;

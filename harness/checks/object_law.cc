@@ -220,7 +220,7 @@ class JudgedObjectLaw final : public JudgedLaw {
   [[nodiscard]] bool demands_acceleration() const override {
     return !baseline_ || options_.law == ControlLaw::kOperationalSpace;
   }
-  [[nodiscard]] VectorXd CalcForce(LawInputs inputs) override {
+  [[nodiscard]] VectorXd CalcForce(const LawInputs& inputs) override {
     const LawTerms& terms = inputs.Link();
     const bool has_force = reference_.Evaluate(*inputs.spec, terms, inputs.now.desired, inputs.F_N) &&
                            (!baseline_ || baseline_->Evaluate(*inputs.spec, reference_, terms, inputs.G_dot,

@@ -88,10 +88,9 @@ void RunChecks::CheckMeasuredState() {
   controller_->RaiseBounds(setup_->scenario().tolerance);
 }
 
-const GraspModel& RunChecks::Follow(const StepRecord& step) {
+void RunChecks::Follow(const StepRecord& step) {
   declared_step_ = &declared_.Follow(step);
   if (!declared_step_->is_measured_right && !controller_) CheckMeasuredState();
-  return *declared_step_->model;
 }
 
 void RunChecks::Reset(Keep keep) {

@@ -58,8 +58,7 @@ class RunChecks {
 
   /// Follows the scenario's declarations for the step, whose command is set: once at each step, before it is
   /// judged, also for steps that are not judged.
-  /// @returns the model at the true state.
-  const GraspModel& Follow(const StepRecord& step);
+  void Follow(const StepRecord& step);
   /// JudgedLaw::Follow.
   void FollowMotion(const Trajectory* motion, double begin) {
     if (law_) law_->Follow(motion, begin);

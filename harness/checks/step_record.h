@@ -85,8 +85,6 @@ struct StepRecord {
   TrackingError error;
   /// The model as the controller evaluated it, at the measured state; until the next step.
   const GraspModel* model = nullptr;
-  /// The model at the true state, with the declared plant; `model` without declarations or checks.
-  const GraspModel* true_model = nullptr;
   /// kappa (39) as a controller that follows its contacts has them, and the distance of each from its true
   /// place. Empty for other controllers.
   std::vector<ContactCoordinates> followed_kappa;

@@ -12,7 +12,6 @@
 #include "harness/corrections/cover.h"
 #include "harness/corrections/link_frames.h"
 #include "harness/corrections/printed_pair.h"
-#include "harness/corrections/read_printed.h"
 #include "harness/corrections/whole_readings.h"
 
 namespace dexcheck {
@@ -56,7 +55,6 @@ class OneWay {
     }
     if (!best->result.agrees && best->result.bits >= kCheap) ChangeFrames(given, &*best);
     best->result.of_second = is_second_;
-    best->result.is_bounded = *budget_ <= 0;
     return std::move(best->result);
   }
 
@@ -453,12 +451,7 @@ FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b) {
   for (const bool of_second : {false, true}) {
     if (best.bits > kSeveral) TryReadings(a, b, of_second, &budget, &best);
   }
-  best.is_bounded = budget <= 0;
   return best;
-}
-
-FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b) {
-  return FindCorrections(ReadPrintedRobot(a, &b), ReadPrintedRobot(b, &a));
 }
 
 std::string DescribeItem(const CorrectionItem& item, const std::string& file) {

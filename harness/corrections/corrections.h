@@ -41,13 +41,11 @@ struct FileCorrections {
   std::vector<CorrectionItem> items;     ///< The one that explains most first.
   std::vector<std::string> unexplained;  ///< "joint q1: position"
   double bits = 0.0;
-  bool is_bounded = false;  ///< The bound on the work was reached: more may be explained than is.
 };
 
 /// Finds what makes the files differ by more than their digits allow. Corrections of the first file,
 /// unless the second is put right by fewer.
 FileCorrections FindCorrections(const PrintedRobot& a, const PrintedRobot& b);
-FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b);
 
 /// Gives `link` what `right` has otherwise than `before`.
 void TakeChanges(PrintedLink before, PrintedLink right, PrintedLink* link);

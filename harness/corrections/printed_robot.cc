@@ -14,10 +14,7 @@ namespace {
 /// Median of the half units of numbers that are no whole ones; 0 of few.
 double FindMedian(std::vector<double> halves) {
   constexpr size_t kFew = 4;
-  if (halves.size() < kFew) return 0.0;
-  const auto middle = halves.begin() + static_cast<std::ptrdiff_t>(halves.size() / 2);
-  std::nth_element(halves.begin(), middle, halves.end());
-  return *middle;
+  return halves.size() < kFew ? 0.0 : Median(std::move(halves));
 }
 
 bool IsWhole(double value) { return std::abs(value - std::round(value)) < 1e-12; }

@@ -102,8 +102,7 @@ double CalcCondition(const RobotDescription& robot, const RobotSpec& spec) {
         least <= largest * static_cast<double>(n) * std::numeric_limits<double>::epsilon();
     conditions.push_back(is_singular ? kInfinity : largest / least);
   }
-  std::nth_element(conditions.begin(), conditions.begin() + kStates / 2, conditions.end());
-  return conditions[kStates / 2];
+  return Median(std::move(conditions));
 }
 
 class JointAudit {

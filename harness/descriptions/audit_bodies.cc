@@ -12,6 +12,7 @@
 
 #include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
+#include "controller/dynamics/torque_regressor.h"
 #include "controller/model/rigid_body.h"
 #include "harness/descriptions/audit.h"
 #include "harness/descriptions/compiled_inertias.h"
@@ -22,16 +23,6 @@ namespace {
 /// Four digits: what a person reads.
 std::string Format(double value) { return fmt::format("{:.4g}", value); }
 std::string Format(const Vector3d& v) { return fmt::format("[{:.4g}, {:.4g}, {:.4g}]", v[0], v[1], v[2]); }
-
-/// Least eigenvalue of [S, m c; m c^T, m] with S = tr(I_o) / 2 - I_o about the link's origin: positive for
-/// every body that fills a volume.
-double CalcLeastPseudoInertia(const MassProperties& body) {
-  const Matrix3d second = 0.5 * body.inertia.trace() * Matrix3d::Identity() - body.inertia +
-                          body.mass * body.com * body.com.transpose();
-  Eigen::Matrix4d J;
-  J << second, body.mass * body.com, body.mass * body.com.transpose(), body.mass;
-  return CalcSymmetricEigenvalues(0.5 * (J + J.transpose()))[0];
-}
 
 class BodyAudit {
  public:
@@ -107,7 +98,8 @@ class BodyAudit {
                 Format(100.0 * (moments[2] / (moments[0] + moments[1]) - 1.0)) + " %";
       }
       Add(AuditLevel::kImpossible, "inertia", part,
-          text + " (least eigenvalue of the pseudo-inertia " + Format(CalcLeastPseudoInertia(body)) + ")");
+          text + " (least eigenvalue of the pseudo-inertia " +
+              Format(CalcSymmetricEigenvalues(CalcPseudoInertia(TorqueRegressor::Pack(body)))[0]) + ")");
       return false;
     }
     return true;

@@ -9,7 +9,6 @@
 
 #include "harness/diagnosis/causes.h"
 #include "harness/diagnosis/force_points.h"
-#include "harness/diagnosis/force_steps.h"
 #include "harness/diagnosis/force_telling.h"
 #include "harness/diagnosis/step_forces.h"
 

@@ -15,9 +15,9 @@
 #include "harness/comparison/file_causes.h"
 #include "harness/corrections/read_printed.h"
 #include "harness/descriptions/mjcf_reader.h"
-#include "harness/diagnosis/force_steps.h"
 #include "harness/diagnosis/search_limit.h"
 #include "harness/diagnosis/signal_causes.h"
+#include "harness/diagnosis/step_forces.h"
 #include "harness/diagnosis/telling.h"
 
 namespace dexcheck {

@@ -81,9 +81,7 @@ class ShapeList {
     std::vector<double> less;
     for (Index i = 0; i < u_.size(); ++i)
       if (got_[i] != 0.0 && got_[i] * u_[i] > 0.0) less.push_back(std::abs(u_[i]) - std::abs(got_[i]));
-    if (less.empty()) return;
-    std::nth_element(less.begin(), less.begin() + static_cast<std::ptrdiff_t>(less.size() / 2), less.end());
-    const double zone = less[less.size() / 2];
+    const double zone = Median(std::move(less));
     if (zone > 0.0 && !IsRefuted(series_, steps_, Transmit({"dead zone", "", zone, 0.0, "", ""}, series_)))
       Add("dead zone", unit, zone, false);
   }

@@ -32,9 +32,8 @@ Sine FindSine(const ArrayXd& y, const ArrayXd& x) {
   const ArrayXd since = x - x.minCoeff();
   std::vector<double> apart;
   for (Eigen::Index i = 1; i < x.size(); ++i) apart.push_back(std::abs(x[i] - x[i - 1]));
-  const auto middle = apart.begin() + static_cast<std::ptrdiff_t>(apart.size() / 2);
-  std::nth_element(apart.begin(), middle, apart.end());
-  const double densest = 0.4 / *middle, grid = 0.25 / since.maxCoeff();  // four for a period in all of it
+  const double densest = 0.4 / Median(std::move(apart)),
+               grid = 0.25 / since.maxCoeff();  // four for a period in all of it
   MatrixXd columns(y.size(), 2);
   // Minus the square of the rest of y beside a sine of this frequency.
   const auto score = [&](double frequency) {

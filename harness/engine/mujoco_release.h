@@ -61,12 +61,10 @@ inline bool CollidesByType(const mjModel& m) {
 inline bool CollidesByPair(const mjModel& /*m*/) { return true; }
 /// The option's value, and the setting of "all", which is fixed where there is no such option.
 inline int GetCollisionOption(const mjModel& /*m*/) { return 0; }
-inline void LetBothCollide(mjModel* /*m*/) {}
 #else
 inline bool CollidesByType(const mjModel& m) { return m.opt.collision != mjCOL_PAIR; }
 inline bool CollidesByPair(const mjModel& m) { return m.opt.collision != mjCOL_DYNAMIC; }
 inline int GetCollisionOption(const mjModel& m) { return m.opt.collision; }
-inline void LetBothCollide(mjModel* m) { m->opt.collision = mjCOL_ALL; }
 #endif
 
 /// Member that says of each equality constraint whether it is active when a run starts.
@@ -256,15 +254,6 @@ inline int FindMassEntry(const mjModel& m, int dof, int steps) {
   return steps < m.M_rownnz[dof] ? m.M_rowadr[dof] + m.M_rownnz[dof] - 1 - steps : -1;
 #else
   return m.dof_Madr[dof] + steps;
-#endif
-}
-
-/// The whole mass matrix, nv x nv.
-inline void ExpandMass(const mjModel& m, const mjData& d, mjtNum* M) {
-#if mjVERSION_HEADER >= 3010000
-  mj_fullM(&m, &d, M);
-#else
-  mj_fullM(&m, M, d.qM);
 #endif
 }
 

@@ -78,7 +78,7 @@ VectorXd FaultyLaw::CalcChange(const MeasuredState& state) {
   wrong.C = model_->robot().C();
   wrong.J_dot = model_->grasp().J_B_dot();
   wrong.G_dot = model_->grasp().G_dot();
-  const VectorXd force = law_.law->CalcForce(std::move(wrong));
+  const VectorXd force = law_.law->CalcForce(wrong);
   if (force.size() == 0) return {};
   return force - snapshot_.inputs.now.force;
 }

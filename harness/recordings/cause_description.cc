@@ -118,13 +118,12 @@ double CauseDescription::LimitOf(const TorqueFault& fault, const VectorXd& a) co
          (1.0 + a[1] / a[0]);
 }
 
-std::string DescribeGeometry(const RobotModel& model, const LinkFrames& frames, const NonlinearFault& fault) {
-  const int parent = model.joint(fault.joint).parent;
+std::string DescribeGeometry(const RobotModel& model, const LinkFrames& frames, int joint, bool is_turn,
+                             const Vector3d& by) {
+  const int parent = model.joint(joint).parent;
   const Matrix3d R = parent < 0 ? Matrix3d(Matrix3d::Identity()) : frames.Find(parent).linear();
-  return (fault.number == NonlinearFault::Number::kPlacement
-              ? "moved by " + ShowVector(R.transpose() * fault.shift) + " m"
-              : "turned by " + ShowVector(R.transpose() * fault.turn) + " rad") +
-         (parent < 0 ? std::string(" in the base's frame") : " in " + frames.NameOf(model.link_name(parent)));
+  return (is_turn ? "turned by " : "moved by ") + ShowVector(R.transpose() * by) + (is_turn ? " rad" : " m") +
+         " in " + (parent < 0 ? "the base's frame" : frames.NameOf(model.link_name(parent)));
 }
 
 Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, VectorXd error) const {
@@ -164,12 +163,8 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
     one.value = LimitOf(fault, a);
     one.error = error[1] * one.value;
   } else if (fault.kind == kGeometry) {
-    const bool is_placement = fault.sums.front().front().column.component == 0;
-    NonlinearFault geometry{
-        .number = is_placement ? NonlinearFault::Number::kPlacement : NonlinearFault::Number::kOrientation,
-        .joint = fault.index};
-    (is_placement ? geometry.shift : geometry.turn) = fault.axes * a;
-    one.detail = DescribeGeometry(model_, frames_, geometry);
+    const bool is_turn = fault.sums.front().front().column.component > 0;
+    one.detail = DescribeGeometry(model_, frames_, fault.index, is_turn, fault.axes * a);
   } else if (fault.kind == kPositionGain) {
     one.value = 1.0 / (1.0 - a[0]);
     one.error *= Square(one.value);

@@ -21,8 +21,9 @@ struct FoundFault {
   [[nodiscard]] bool HasSize() const;
 };
 
-/// Returns by what a joint is displaced, in its parent's frame.
-std::string DescribeGeometry(const RobotModel& model, const LinkFrames& frames, const NonlinearFault& fault);
+/// Says by what a joint is displaced or turned. @param by in its parent's frame, m or rad.
+std::string DescribeGeometry(const RobotModel& model, const LinkFrames& frames, int joint, bool is_turn,
+                             const Vector3d& by);
 
 class CauseDescription {
  public:

@@ -9,6 +9,7 @@
 
 #include "controller/common/errors.h"
 #include "controller/common/text.h"
+#include "harness/base/ranges.h"
 
 namespace dexcheck {
 namespace {

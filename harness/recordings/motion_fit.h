@@ -17,9 +17,6 @@
 namespace dexcheck {
 
 inline double Square(double x) { return x * x; }
-/// 0 of none.
-double Median(std::vector<double> values);
-
 /// The results of a first reading, so that the next has columns that fit better.
 struct Refinements {
   std::map<int, double> stribeck;       ///< Velocities below which joints have more friction, rad/s or m/s.

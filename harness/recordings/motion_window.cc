@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "controller/common/errors.h"
+#include "harness/base/ranges.h"
 #include "harness/recordings/jumps.h"
 #include "harness/recordings/motion_fit.h"
 
@@ -18,13 +19,6 @@ constexpr int kHigherOrder = 6;
 constexpr size_t kHalves[] = {3, 4, 6, 8, 11, 16, 23, 32, 45, 64, 90, 128};
 
 }  // namespace
-
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double MotionFit::FindQuantum(Eigen::Index channel) const {
   double least = std::numeric_limits<double>::infinity();

@@ -26,7 +26,9 @@ Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const N
   Explanation one = MakeCause(found.fault);
   if (found.IsOfModel()) {
     one.channel = CauseChannel::kBalance;
-    one.faults.front().detail = DescribeGeometry(model, frames, found);
+    const bool is_turn = found.number != NonlinearFault::Number::kPlacement;
+    one.faults.front().detail =
+        DescribeGeometry(model, frames, found.joint, is_turn, is_turn ? found.turn : found.shift);
     if (!found.shows_all) one.faults.front().detail += ", as far as this motion shows it";
   }
   const bool is_offset = found.offset != 0.0 && found.joint >= 0 && model.joint(found.joint).parent < 0;

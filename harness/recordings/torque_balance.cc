@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "controller/common/linear_algebra.h"
+#include "harness/recordings/nonlinear_faults.h"
 
 namespace dexcheck {
 
@@ -15,22 +16,22 @@ double FindCutOff(const Refinements& refinements, int joint, int component, doub
   return known != refinements.limits.end() ? known->second : kFractions[component / 2] * most;
 }
 
-NonlinearFault GeometryFault(const RobotModel& model, int joint, int component,
-                             const Eigen::Ref<const VectorXd>& amplitude) {
+constexpr double kDisplaced = 1e-6;  // m, rad
+
+/// A joint's fault of geometry, of one of its components.
+static NonlinearFault GeometryFault(const RobotModel& model, int joint, int component) {
   using enum NonlinearFault::Number;
   NonlinearFault fault{.number = component < 3   ? kPlacement
                                  : component < 5 ? kOrientation
                                                  : kAxis,
                        .joint = joint};
   if (component < 3) {
-    fault.shift.segment(component, amplitude.size()) = amplitude;
+    fault.shift[component] = kDisplaced;
   } else {
-    fault.turn = FindDirections(model, joint).middleCols((component - 3) % 2, amplitude.size()) * amplitude;
+    fault.turn = kDisplaced * FindDirections(model, joint).col((component - 3) % 2);
   }
   return fault;
 }
-
-constexpr double kDisplaced = 1e-6;  // m, rad
 
 TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& joints, bool has_currents,
                              const Refinements& refinements)
@@ -51,7 +52,7 @@ TorqueBalance::TorqueBalance(const RobotModel& model, const std::vector<int>& jo
   residual_ = VectorXd::Zero(static_cast<Index>(joints.size()));
   for (int k = 0; k < kGeometries * n && n <= kMostWithGeometry; ++k) {
     RobotSpec spec = model.spec();
-    GeometryFault(model, k / kGeometries, k % kGeometries, VectorXd::Constant(1, kDisplaced)).Undo(&spec);
+    GeometryFault(model, k / kGeometries, k % kGeometries).Undo(&spec);
     Displaced& one = displaced_.emplace_back();
     one.model = std::make_unique<RobotModel>(std::move(spec));
     one.regressor = std::make_unique<TorqueRegressor>(*one.model);

@@ -14,7 +14,6 @@
 
 #include "controller/dynamics/torque_regressor.h"
 #include "harness/recordings/motion_fit.h"
-#include "harness/recordings/nonlinear_faults.h"
 
 namespace dexcheck {
 
@@ -60,9 +59,6 @@ struct TorqueColumn {
 inline constexpr int kCutOffs = 3;
 /// Components of kGeometry: three of a placement, then two each of an orientation and an axis.
 inline constexpr int kGeometries = 7;
-/// Returns a joint's fault of geometry whose amplitudes are these, from a component on.
-NonlinearFault GeometryFault(const RobotModel& model, int joint, int component,
-                             const Eigen::Ref<const VectorXd>& amplitude);
 /// Robots of more joints have no kGeometry: their regression would be too wide.
 inline constexpr int kMostWithGeometry = 12;
 

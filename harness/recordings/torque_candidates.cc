@@ -430,36 +430,7 @@ class FaultList {
   std::vector<TorqueFault> faults_;
 };
 
-/// Second moments, mass times centre, mass.
-Eigen::Matrix4d PackPseudoInertia(const BodyVector& body) {
-  const Matrix3d I = ToTensor(body.tail<6>());
-  Eigen::Matrix4d pseudo;
-  // The second moments are half the trace of I less I.
-  pseudo << 0.5 * I.trace() * Matrix3d::Identity() - I, body.segment<3>(1), body.segment<3>(1).transpose(),
-      body[0];
-  return pseudo;
-}
-
 }  // namespace
-
-bool IsBody(const BodyVector& body) {
-  const Eigen::Matrix4d pseudo = PackPseudoInertia(body);
-  constexpr double kRounding = 1e-9;
-  return body[0] > 0.0 && CalcSymmetricEigenvalues(pseudo)[0] >= -kRounding * pseudo.trace();
-}
-
-BodyVector FindNearestBody(const BodyVector& body) {
-  const SymmetricEigen eigen = DecomposeSymmetric(PackPseudoInertia(body));
-  // No thinner than readers of descriptions take for a body.
-  constexpr double kThinnest = 1e-6;
-  const VectorXd possible = eigen.values.cwiseMax(kThinnest * eigen.values.cwiseAbs().maxCoeff());
-  const Eigen::Matrix4d pseudo = eigen.vectors * possible.asDiagonal() * eigen.vectors.transpose();
-  const Matrix3d moments = pseudo.topLeftCorner<3, 3>();
-  BodyVector nearest;
-  nearest << pseudo(3, 3), pseudo.topRightCorner<3, 1>(),
-      ToEntries(moments.trace() * Matrix3d::Identity() - moments);
-  return nearest;
-}
 
 std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::vector<int>& joints,
                                           int recordings, const Refinements& refinements,

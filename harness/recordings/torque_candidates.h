@@ -124,9 +124,4 @@ std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::ve
 /// @param amplitude a shift, m; mass (kg) and mass times place (kg m).
 void PlaceMass(const RobotModel& model, const VectorXd& amplitude, TorqueFault* fault);
 
-/// Whether there is a body of such mass, centre and inertia: its pseudo-inertia is positive.
-bool IsBody(const TorqueRegressor::BodyVector& body);
-/// The nearest one that there is: of least distance between pseudo-inertias.
-TorqueRegressor::BodyVector FindNearestBody(const TorqueRegressor::BodyVector& body);
-
 }  // namespace dexcheck

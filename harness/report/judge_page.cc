@@ -109,9 +109,8 @@ Traces ListTraces(const RecordingJudgement& judgement, int recording) {
     if (trace.recording == recording) all.push_back(&trace);
   std::vector<double> steps;
   for (size_t i = 1; i < all.size(); ++i) steps.push_back(all[i]->time - all[i - 1]->time);
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
   constexpr double kGap = 5.0;  // of usual steps
-  const double gap = steps.empty() ? 0.0 : kGap * steps[steps.size() / 2];
+  const double gap = kGap * Median(std::move(steps));
   for (const TorqueTrace* trace : all) {
     if (!traces.empty() && trace->time - traces.back()->time > gap) traces.push_back(nullptr);
     traces.push_back(trace);

@@ -108,7 +108,7 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
   if (check) checks_.emplace(setup, plant_->motors(), parts.knows_law);
   if (check)
     store_.emplace(setup, checks_->law(), checks_->Has("rolling") ? checks_->Find("rolling").bound : 0.0);
-  record_.model = record_.true_model = &controller_->model();
+  record_.model = &controller_->model();
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
   trajectory_ = setup.MakeTrajectory();
@@ -170,7 +170,7 @@ bool ClosedLoop::SettleOn(const Trajectory& motion, double duration, double end,
     record_.time = end - duration + t;
     MakeStep(t);
     if (checks_) checks_->JudgeEffort(record_, t);
-    if (checks_) record_.true_model = &checks_->Follow(record_);
+    if (checks_) checks_->Follow(record_);
     // The first contact is rough; later errors have a cause that the checks should report.
     if (i == rough || i == grip) ForgetSteps(RunChecks::Keep::kHoldsAlways);
     if (checks_) {
@@ -227,7 +227,7 @@ void ClosedLoop::ControlStep(double t) {
   sensing_.Measure(record_.reading, &record_.measured);
   if (hidden_sensor_fault_) hidden_sensor_fault_(t, &record_.measured.state);
   controller_->Step(record_.measured, t, &record_.command);
-  record_.model = record_.true_model = &controller_->model();
+  record_.model = &controller_->model();
   DriveMotors(t);
   if (!disturbances_.empty()) {
     plant_->Push(disturbances_.Evaluate(record_.time, record_.reading));
@@ -248,9 +248,9 @@ void ClosedLoop::DriveMotors(double t) {
   } catch (const RunFailure&) {
     Finish();
     if (checks_) checks_->JudgeEffort(record_, t);
-    if (checks_) record_.true_model = &checks_->Follow(record_);
     // Torques that are too large may be those of no law, or motors and sensors may be at fault.
     if (checks_) {
+      checks_->Follow(record_);
       checks_->JudgeUnsent(record_);
       store_->Add(record_, checks_->analysis(), !is_running_ || checks_->differs(),
                   StepStore::Judged::kReadings);
@@ -275,7 +275,7 @@ void ClosedLoop::MakeStep(double t) {
 void ClosedLoop::Judge(StepRecord* step) {
   const auto begin = Clock::now();
   checks_->JudgeEffort(*step, step->time);
-  step->true_model = &checks_->Follow(*step);
+  checks_->Follow(*step);
   checks_->JudgeModel(*step);
   checks_->JudgeStep(*step);
   step->findings = checks_->analysis().findings;

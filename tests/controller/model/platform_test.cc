@@ -98,7 +98,7 @@ TEST(PlatformByHand, FacingYWithTwist) {
   EXPECT_TRUE(MatrixNear(platform.S_v * v, Vector3d(0.0, 1.0, 0.5), kRounding));
   // A turning forward speed of 1 m/s: centripetal acceleration v_c w_c towards -x.
   EXPECT_TRUE(MatrixNear(platform.S_v_dot * v, Vector3d(-0.5, 0.0, 0.0), kRounding));
-  EXPECT_TRUE(MatrixNear(CalcWheelRates(base, v), Vector2d(11.0, 9.0), kRounding));
+  EXPECT_TRUE(MatrixNear(CalcWheelRateMap(base) * v, Vector2d(11.0, 9.0), kRounding));
   // 3 and 1 N m at r = 0.1 m push with 30 and 10 N: 40 N along +y and (30 - 10) 0.2 = 4 N m about z.
   const Vector2d tau(3.0, 1.0);
   EXPECT_TRUE(MatrixNear(platform.E_v * tau, Vector3d(0.0, 40.0, 4.0), kRounding));
@@ -119,7 +119,7 @@ TEST_P(PlatformTest, WheelsRollWithoutSlipInSpace) {
     const PlatformConstraint platform = CalcPlatformConstraint(base_, state.q_v, state.v);
     const Vector3d q_v_dot = platform.S_v * state.v;
     ASSERT_GT(q_v_dot.norm(), kVisible);
-    EXPECT_LE(CalcContactPointSpeed(state.q_v, q_v_dot, CalcWheelRates(base_, state.v)),
+    EXPECT_LE(CalcContactPointSpeed(state.q_v, q_v_dot, CalcWheelRateMap(base_) * state.v),
               kRounding * TolScale());
   }
 }
@@ -136,7 +136,7 @@ TEST_P(PlatformTest, VirtualPowerBalances) {
   const Vector2d tau(3.0, -1.7);
   for (const State& state : states_) {
     const PlatformConstraint platform = CalcPlatformConstraint(base_, state.q_v, state.v);
-    const Vector2d wheel_rates = CalcWheelRates(base_, state.v);
+    const Vector2d wheel_rates = CalcWheelRateMap(base_) * state.v;
     const double power = tau.dot(wheel_rates);
     ASSERT_GT(std::abs(power), kVisible);
     EXPECT_NEAR((platform.E_v * tau).dot(platform.S_v * state.v), power, kRounding * TolScale());

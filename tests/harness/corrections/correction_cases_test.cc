@@ -22,6 +22,10 @@ using ::testing::HasSubstr;
 
 DescriptionFile Read(const std::string& name, const std::string& text) { return {name, text, {}}; }
 
+FileCorrections FindCorrections(const DescriptionFile& a, const DescriptionFile& b) {
+  return dexcheck::FindCorrections(ReadPrintedRobot(a, &b), ReadPrintedRobot(b, &a));
+}
+
 std::string Replace(std::string text, const std::string& from, const std::string& to) {
   const size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;

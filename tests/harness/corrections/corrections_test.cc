@@ -14,6 +14,7 @@
 #include <fstream>
 #include <map>
 
+#include "harness/corrections/read_printed.h"
 #include "tests/harness/corrections/drawn_faults.h"
 
 namespace dexcheck::testing::corrections_test {
@@ -151,7 +152,7 @@ class Campaign {
     try {
       const DescriptionFile a("a" + drawn.end_a, drawn.a, {});
       const DescriptionFile b("b" + drawn.end_b, drawn.b, {});
-      found = FindCorrections(a, b);
+      found = FindCorrections(ReadPrintedRobot(a, &b), ReadPrintedRobot(b, &a));
     } catch (const std::exception& error) {
       // The engine refuses masses and inertias that no body has. Everything else that is drawn must be read.
       EXPECT_TRUE(std::ranges::any_of(
