@@ -118,8 +118,19 @@ RobotModel ParseRobotModel(std::string_view text, std::string_view source,
 
 RobotModel ParseRobotModel(TomlDocument document, std::string_view source,
                            std::span<const std::string> overrides, std::vector<WrittenRow>* rows) {
+  std::vector<std::string> given;
+  if (const std::optional<TomlValue> lengths = document.Open().Find("lengths"))
+    for (const auto& [name, value] : lengths->AsTable().GetEntries()) given.push_back(name);
   for (const std::string& assignment : overrides) document.Override(assignment);
-  return document.Read([&](TomlTable root) { return ReadRobot(root, source, document, rows); });
+  return document.Read([&](TomlTable root) {
+    // A length that an assignment adds would change nothing: it is misspelt.
+    if (const std::optional<TomlValue> lengths = root.Find("lengths"); lengths && !overrides.empty()) {
+      TomlTable table = lengths->AsTable();
+      for (const std::string& name : given) (void)table.Find(name);
+      table.RejectUnused();
+    }
+    return ReadRobot(root, source, document, rows);
+  });
 }
 
 RobotModel ReadRobotModel(const std::filesystem::path& path, std::vector<WrittenRow>* rows) {
