@@ -14,7 +14,8 @@ namespace dexcheck {
 struct FoundFault {
   TorqueFault fault;
   VectorXd amplitude, error;
-  bool is_named = true;           ///< No other cause explains the same.
+  bool is_named = true;   ///< No other cause explains the same.
+  bool is_guess = false;  ///< It, and all that explains the same, is nonlinear and to be searched for.
   std::vector<Fault> parts = {};  ///< Whole numbers of each joint, where it has one for each.
 
   /// Whether the size is one that can be, and no zero within its error.

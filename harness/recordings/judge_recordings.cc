@@ -111,6 +111,7 @@ class Judge {
   /// Refines the velocity of friction at low speed, and the frequency of a base that shakes.
   void Refine(const VectorXd& left) {
     Refinements& next = result_.refinements;
+    next.held_stretch = set_.refinements().held_stretch;
     next.shaking = set_.refinements().shaking;
     next.gravity = set_.refinements().gravity;
     next.advances_velocities = set_.refinements().advances_velocities;
@@ -220,9 +221,11 @@ class Judge {
       one.ends = true;
     }
     FoundFault found{fault, term.amplitude, term.error};
+    found.is_guess = fault.IsGuess();
     const bool is_shared = description_.AddWholeNumbers(&found, &one.faults.front());
     for (const auto& [candidate, amplitude] : term.same) {
       const TorqueFault& other = estimator_.faults()[candidate];
+      found.is_guess = found.is_guess && other.IsGuess();
       // With each joint's gain sought, the model's bodies are the scale that shows it.
       if (is_shared && (other.kind == fault.kind || other.IsOfLoad())) continue;
       Fault same = description_.Describe(other, amplitude, {});
@@ -321,10 +324,12 @@ class Judge {
 }  // namespace
 
 bool RecordingJudgement::IsNoise() const {
-  return !balances.empty() &&
-         (has_pushes || by_causes.held_left <= std::hypot(kMostNoise, by_causes.inexact)) &&
-         std::ranges::all_of(balances,
-                             [](const JointJudgement& one) { return one.left <= kMostNoise * one.noise; });
+  const double most_held = std::hypot(kMostNoise, by_causes.inexact);
+  return !balances.empty() && (has_pushes || by_causes.held_left <= most_held) &&
+         std::ranges::all_of(balances, [&](const JointJudgement& one) {
+           return one.left <= kMostNoise * one.noise &&
+                  (has_pushes || one.held_left <= most_held * one.noise);
+         });
 }
 
 size_t RecordingJudgement::CountExplaining() const {

@@ -214,8 +214,20 @@ BaseMotion MotionFit::CalcBase(const MatrixXd& fitted) const {
   return base;
 }
 
+VectorXd MotionFit::CalcRateErrors(const VectorXd& times, const MatrixXd& C, bool of_positions) const {
+  MatrixXd powers = MatrixXd::Zero(times.size(), C.rows());
+  const Eigen::Index lowest = of_positions ? 1 : 0;
+  powers.col(lowest).setOnes();
+  for (Eigen::Index p = lowest + 1; p < powers.cols(); ++p)
+    powers.col(p) = powers.col(p - 1).cwiseProduct(times);
+  if (of_positions) powers *= VectorXd::LinSpaced(C.rows(), 0.0, kOrder).asDiagonal();
+  const MatrixXd covariance = C * C.transpose();
+  return ((powers * covariance).cwiseProduct(powers).rowwise().sum() / covariance(lowest, lowest))
+      .cwiseSqrt();
+}
+
 void MotionFit::AverageFriction(int joint, const VectorXd& times, const VectorXd& rate,
-                                const VectorXd& weights) {
+                                const VectorXd& weights, const VectorXd& errors) {
   auto shapes = sample_.friction.row(joint);
   shapes.setZero();
   double direction = 0.0, slip = 0.0, first = 0.0, slowest = std::numeric_limits<double>::infinity();
@@ -230,7 +242,7 @@ void MotionFit::AverageFriction(int joint, const VectorXd& times, const VectorXd
     here[kSlipShape] = slip;
     direction += weights[k] * sign;
     if (k == 0) first = sign;
-    slowest = std::min(slowest, v * first);
+    slowest = std::min(slowest, v * first / errors[k]);
     shapes += weights[k] * here;
   }
   sample_.direction[joint] = direction;
@@ -276,6 +288,7 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
   const VectorXd phases = refinements_.shaking * window.col(time);
   sample_.swing =
       C.row(0) * (MatrixXd(phases.size(), 2) << phases.array().sin(), phases.array().cos()).finished();
+  VectorXd errors[2];
   for (int joint = 0; joint < model_->num_joints(); ++joint) {
     const int position = ChannelOf(RecordedQuantity::kPosition, joint);
     if (position < 0) continue;
@@ -295,7 +308,9 @@ bool MotionFit::Emit(size_t centre, const Receiver& receive) {
     if (facts_.stands)
       for (VectorXd* const each : {&sample_.qd, &sample_.qdd, &sample_.jerk, &sample_.snap})
         (*each)[joint] = 0.0;
-    AverageFriction(joint, times, rate, C.row(0).transpose());
+    VectorXd& known = errors[velocity >= 0 ? 1 : 0];
+    if (known.size() == 0) known = CalcRateErrors(times, C, velocity < 0);
+    AverageFriction(joint, times, rate, C.row(0).transpose(), known);
     const int torque = ChannelOf(Effort(), joint);
     if (torque < 0) continue;
     sample_.torque[joint] = fitted(0, torque);
@@ -341,6 +356,46 @@ void MotionFit::CalcSpeeds() {
     const bool moves_far = least > 0.0 && span > kFar;
     facts_.moves.push_back(moving[joint] > (moves_far ? kMovingFar : kMoving) * count && span > least);
   }
+}
+
+VectorXd MotionFit::CalcFilteredNoise() {
+  // The halves are every other part of a window. A part is longer than most filters remember.
+  constexpr Eigen::Index kFewestParts = 8, kLongest = 12;
+  constexpr double kMedian = 0.455;  // of chi^2 with one degree of freedom
+  const int time = ChannelOf(RecordedQuantity::kTime, -1);
+  const auto rows = static_cast<Eigen::Index>(2 * half_ + 1);
+  std::vector<Eigen::Index> halves[2];
+  const Eigen::Index parts = std::max(kFewestParts, rows / kLongest);
+  for (Eigen::Index k = 0; k < rows; ++k) halves[k * parts / rows % 2].push_back(k);
+  VectorXd noise = VectorXd::Zero(model_->num_joints());
+  if (halves[1].size() <= kOrder) return noise;
+  std::vector<std::vector<double>> squares(static_cast<size_t>(noise.size()));
+  for (const size_t centre : ListCentres(CalcReach())) {
+    const MatrixXd window = GetWindow(centre, half_);
+    MatrixXd powers = MatrixXd::Ones(rows, kOrder + 1);
+    for (int p = 1; p <= kOrder; ++p)
+      powers.col(p) = powers.col(p - 1).array() * (window.col(time).array() - rows_ahead_[centre][time]) /
+                      (static_cast<double>(half_) * facts_.step);
+    Eigen::RowVectorXd difference = Eigen::RowVectorXd::Zero(rows);
+    for (const int k : {0, 1})
+      difference(halves[k]) =
+          (k == 0 ? 1.0 : -1.0) *
+          MatrixXd(powers(halves[k], Eigen::all)).completeOrthogonalDecomposition().pseudoInverse().row(0);
+    difference *= CalcCoefficients(centre, half_, kOrder).row(0).norm() / difference.norm();
+    // Friction that turns round is no noise.
+    Emit(centre, [&](const RecordedSample& sample) {
+      for (size_t joint = 0; joint < squares.size(); ++joint) {
+        const auto at = static_cast<Eigen::Index>(joint);
+        const int channel = ChannelOf(Effort(), static_cast<int>(joint));
+        if (channel >= 0 && (!facts_.moves[joint] || sample.slowest[at] >= facts_.rest[at]))
+          squares[joint].push_back(Square(difference.dot(window.col(channel))));
+      }
+      return true;
+    });
+  }
+  for (Eigen::Index joint = 0; joint < noise.size(); ++joint)
+    noise[joint] = std::sqrt(Median(squares[static_cast<size_t>(joint)]) / kMedian);
+  return noise;
 }
 
 std::vector<bool> MotionFit::IsJudged(const RecordedSample& sample) const {

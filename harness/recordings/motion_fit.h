@@ -19,6 +19,7 @@ namespace dexcheck {
 inline double Square(double x) { return x * x; }
 /// The results of a first reading, so that the next has columns that fit better.
 struct Refinements {
+  long held_stretch = 3;                ///< Which of four stretches is held out.
   std::map<int, double> stribeck;       ///< Velocities below which joints have more friction, rad/s or m/s.
   std::map<int, double> smooth;         ///< Velocities over which joints' dry friction turns, rad/s or m/s.
   std::map<int, double> limits;         ///< Torques at which joints' were cut off, N m or N.
@@ -52,7 +53,8 @@ struct RecordedSample {
 struct MotionFacts {
   VectorXd position, velocity, torque;  ///< Of a single number.
   VectorXd smooth_position, smooth_torque,
-      acceleration;           ///< Of a sample, the last with what smoothing leaves out.
+      acceleration,           ///< Of a sample, this and the next with what smoothing leaves out.
+      damped;                 ///< Of the model's viscous friction in a sample.
   VectorXd wrench;            ///< Of a sample; empty for none.
   double base = 0.0;          ///< Of a sample: the base's acceleration with gravity, m/s^2.
   VectorXd rest;              ///< Velocity below which a joint is at rest.
@@ -115,6 +117,9 @@ class MotionFit {
   void CheckRows();
   /// Noise of each channel: what polynomials over short windows leave.
   [[nodiscard]] VectorXd MeasureNoise(const std::vector<size_t>& centres, size_t half) const;
+  /// Noise of smoothed torques, which a drive's filter has made similar in rows that follow each other: fits
+  /// to two halves of a window differ by it.
+  [[nodiscard]] VectorXd CalcFilteredNoise();
   void ChooseWindow(const std::vector<size_t>& centres);
   void CalcSpeeds();
   void AddWrenchErrors();
@@ -153,7 +158,12 @@ class MotionFit {
   [[nodiscard]] BaseMotion CalcBase(const MatrixXd& fitted) const;
   void CheckBase(Row* row) const;
   /// Averages the shapes of a joint's friction over a window. @param rate coefficients of its velocity.
-  void AverageFriction(int joint, const VectorXd& times, const VectorXd& rate, const VectorXd& weights);
+  /// @param errors CalcRateErrors.
+  void AverageFriction(int joint, const VectorXd& times, const VectorXd& rate, const VectorXd& weights,
+                       const VectorXd& errors);
+  /// Returns the standard errors of a smoothed velocity at the times of a window's rows, which are larger at
+  /// its ends, as multiples of the one at its centre. @param C the window's CalcCoefficients.
+  [[nodiscard]] VectorXd CalcRateErrors(const VectorXd& times, const MatrixXd& C, bool of_positions) const;
   bool Emit(size_t centre, const Receiver& receive);
   /// @param fitted the torque's polynomial about the centre.
   [[nodiscard]] double CalcTorqueRate(int joint, size_t centre,

@@ -226,6 +226,7 @@ void MotionFit::Analyse() {
   facts_.base = 2.0 * std::sqrt(base[0] * C.row(2).squaredNorm() +
                                 base[1] * C.row(0).squaredNorm() * model_->gravity().squaredNorm());
   CalcSpeeds();
+  facts_.smooth_torque = facts_.smooth_torque.cwiseMax(CalcFilteredNoise()).eval();
 }
 
 void MotionFit::AddWrenchErrors() {
@@ -409,13 +410,15 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
                                   : has_velocity   ? RecordedQuantity::kVelocity
                                                    : RecordedQuantity::kPosition;
   const int derivative = has_acceleration ? 0 : has_velocity ? 1 : 2;
-  const double factorial = derivative == 2 ? 2.0 : 1.0;
+  VectorXd damping(model_->num_joints());
+  for (int joint = 0; joint < damping.size(); ++joint) damping[joint] = model_->joint(joint).damping;
   double best = std::numeric_limits<double>::infinity(), smoothed = 1.0;
   for (const size_t half : kHalves) {
     const std::vector<size_t> centres = ListCentres(half);
     if (2 * half + 1 > rows_ahead_.size() / 4 || centres.size() < all.size() / 2) break;
     const Eigen::Index n = model_->num_joints();
-    VectorXd variance = VectorXd::Zero(n), bias = VectorXd::Zero(n);
+    // Of accelerations, and of velocities.
+    MatrixXd variance = MatrixXd::Zero(n, 2), bias = variance;
     double value = 0.0, rate = 0.0;
     for (const size_t centre : centres) {
       const MatrixXd window = GetWindow(centre, half);
@@ -429,20 +432,26 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
         const double sigma = source == RecordedQuantity::kPosition   ? facts_.position[joint]
                              : source == RecordedQuantity::kVelocity ? facts_.velocity[joint]
                                                                      : 0.0;
-        variance[joint] += Square(factorial * sigma) * C.row(derivative).squaredNorm();
-        bias[joint] += Square(factorial) *
-                       (Square((C.row(derivative) - higher.row(derivative)).dot(window.col(channel))) -
-                        Square(sigma) * (C.row(derivative) - higher.row(derivative)).squaredNorm());
+        for (int k = 0, order = derivative; k < 2 && order >= 0; ++k, --order) {
+          const double factorial = order == 2 ? 2.0 : 1.0;
+          const Eigen::RowVectorXd beyond = C.row(order) - higher.row(order);
+          variance(joint, k) += Square(factorial * sigma) * C.row(order).squaredNorm();
+          bias(joint, k) += Square(factorial) *
+                            (Square(beyond.dot(window.col(channel))) - Square(sigma) * beyond.squaredNorm());
+        }
       }
     }
     const double count = static_cast<double>(centres.size());
-    const VectorXd squares = (variance + bias.cwiseMax(0.0)) / count;
-    const double score = (facts_.inertia.array().square().matrix() * squares).sum();
+    bias = bias.cwiseMax(0.0).eval();
+    const MatrixXd squares = (variance + bias) / count;
+    const double score =
+        (facts_.inertia.cwiseAbs2() * squares.col(0)).sum() + damping.cwiseAbs2().dot(squares.col(1));
     // A robot at rest shows torques alone, over a time as short as a push.
     if (!(score < best) || (facts_.stands && std::isfinite(best))) continue;
     best = score;
     half_ = half;
-    facts_.acceleration = squares.cwiseSqrt();
+    facts_.acceleration = squares.col(0).cwiseSqrt();
+    facts_.damped = damping.cwiseProduct(squares.col(1).cwiseSqrt());
     smoothed = std::sqrt(value / count);
     facts_.smooth_position = smoothed * facts_.position;
     facts_.smooth_torque = smoothed * facts_.torque;
@@ -452,7 +461,7 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
   }
   if (!std::isfinite(best))
     throw InputError(recording_->name + ": is too short to derive accelerations from");
-  if (facts_.stands) facts_.acceleration.setZero();
+  if (facts_.stands) facts_.acceleration.setZero(), facts_.damped.setZero();
   stride_ = std::max<size_t>(1, half_ / 2);
   facts_.wrench *= smoothed;
 }

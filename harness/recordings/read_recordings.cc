@@ -83,7 +83,7 @@ void RecordingSet::Read(Recording* recording, const ReadOptions& options,
     if (samples == 0) begin = sample.time;
     const long stretch = std::lround(std::floor((sample.time - begin) / kStretch));
     // A robot that stands is of interest only when something acts.
-    const bool is_held = stretch % kEvery == kEvery - 1 && !motion.facts().stands;
+    const bool is_held = stretch % kEvery == options.refinements.held_stretch && !motion.facts().stands;
     TorqueBalance& balance = is_held ? *one.held : *one.fit;
     balance.Add(sample, motion.IsJudged(sample));
     ReportSecond(options, sample.time, balance.residual());
@@ -131,7 +131,8 @@ double RecordingSet::CalcNoise(const ReadRecording& one, size_t place) const {
     const Index at = balance.Find(place, column);
     return at < 0 ? 0.0 : balance.products(place)(at, at) / samples;
   };
-  double variance = Square(one.motion.smooth_torque[joint] * gains_[static_cast<Index>(place)]);
+  double variance = Square(one.motion.smooth_torque[joint] * gains_[static_cast<Index>(place)]) +
+                    Square(one.motion.damped[joint]);
   for (int other = 0; other < model_->num_joints(); ++other) {
     variance += Square(one.motion.inertia(joint, other) * one.motion.acceleration[other]);
     variance += mean_square({TorqueColumn::kPosition, other}) * Square(one.motion.smooth_position[other]);

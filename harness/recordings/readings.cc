@@ -48,12 +48,9 @@ Explanation MakeCause(const RobotModel& model, const LinkFrames& frames, const N
 /// A wrong geometry of the model is rarer than a wrong body.
 constexpr long kRarer = 2;
 
-/// Returns how many numbers explain a judgement, with those that velocities are off by. A displacement and a
-/// gain of positions are first guesses of what is searched for.
+/// Returns how many numbers explain a judgement, with those that velocities are off by.
 long CountNumbers(const RecordingJudgement& judgement) {
-  const long guesses = std::ranges::count_if(judgement.found, [](const FoundFault& one) {
-    return one.fault.kind == TorqueFault::kGeometry || one.fault.kind == TorqueFault::kPositionGain;
-  });
+  const long guesses = std::ranges::count_if(judgement.found, &FoundFault::is_guess);
   return judgement.by_causes.numbers + (kRarer + 1) * guesses +
          std::ranges::count(judgement.causes, CauseChannel::kMeasurement, &Explanation::channel);
 }
@@ -167,6 +164,7 @@ class Readings {
   RecordingJudgement Run() {
     TriedReading reading{Judge({}, refinements_)};
     AdvanceVelocities(&reading);
+    HoldOutOthers(&reading);
     Search(/*of_model=*/false, &reading);
     Refine(&reading);
     Search(/*of_model=*/true, &reading);
@@ -211,6 +209,22 @@ class Readings {
     } else {
       refinements_.advances_velocities = false;
     }
+  }
+
+  /// Looks for what happened while everything that would show it was held out.
+  void HoldOutOthers(TriedReading* reading) {
+    const auto happened = [](const JointJudgement& one) {
+      constexpr double kMore = 1.2;  // than where the causes were found
+      return one.held_left > std::max(kMostNoise * one.noise, kMore * one.left);
+    };
+    if (!goes_on_ || std::ranges::none_of(reading->judgement.balances, happened) || !Reopen({})) return;
+    Refinements others = refinements_;
+    others.held_stretch = 1;
+    TriedReading again{Judge({}, others)};
+    const bool has_more = again.judgement.CountExplaining() > reading->judgement.CountExplaining();
+    if (!goes_on_ || (!has_more && !IsBetter(again, *reading))) return;
+    refinements_ = others;
+    *reading = std::move(again);
   }
 
   /// Undoes one nonlinear fault after the other while that explains more.

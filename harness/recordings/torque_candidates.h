@@ -91,6 +91,8 @@ struct TorqueFault : Candidate {
   [[nodiscard]] bool HasVelocity() const {
     return kind == kStribeckFriction || (kind == kDryFriction && sums.size() == 2);
   }
+  /// Whether its columns hold for small sizes only.
+  [[nodiscard]] bool IsGuess() const { return kind == kGeometry || kind == kPositionGain; }
   /// An error of a joint's measured position.
   [[nodiscard]] bool IsOfPosition() const { return kind >= kZero && kind <= kPositionGain; }
   /// A fault of bodies, gravity, positions or springs: all but the drive's own numbers.
