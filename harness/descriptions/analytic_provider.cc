@@ -126,7 +126,7 @@ void AnalyticProvider::ReadVelocities(const Eigen::Ref<const VectorXd>& own, Eig
 
 void AnalyticProvider::ReadMatrix(const MatrixXd& own, Eigen::Ref<MatrixXd> out) const {
   if (map_.is_identity) {
-    CopyColumns(own, 0, out);
+    out = own;
   } else if (own.rows() == xi_.size()) {
     out = own(map_.velocities, map_.velocities);
   } else {
@@ -144,7 +144,7 @@ void AnalyticProvider::ReadJacobians(Eigen::Ref<MatrixXd> out) const {
   for (size_t i = 0; i < jacobians_.size(); ++i) {
     const Eigen::Index first = static_cast<Eigen::Index>(i) * n;
     if (map_.is_identity) {
-      CopyColumns(*jacobians_[i].first, first, out);
+      out.middleCols(first, n) = *jacobians_[i].first;
     } else {
       out.middleCols(first, n) = (*jacobians_[i].first)(Eigen::all, map_.velocities);
     }

@@ -4,15 +4,6 @@
 
 namespace dexcheck {
 
-void CopyColumns(const Eigen::Ref<const MatrixXd>& columns, Eigen::Index first, Eigen::Ref<MatrixXd> out) {
-  const Eigen::Index rows = columns.rows();
-  if (columns.outerStride() == rows && out.outerStride() == rows) {
-    std::copy_n(columns.data(), columns.size(), out.col(first).data());
-  } else {
-    out.middleCols(first, columns.cols()) = columns;
-  }
-}
-
 bool MechanismProvider::HasValue(Term term) const {
   switch (term) {
     case Term::kMHat:
@@ -31,21 +22,14 @@ bool MechanismProvider::HasValue(Term term) const {
   }
 }
 
-bool MechanismProvider::ReadValues(Term term, Eigen::Ref<MatrixXd> out) const {
-  const auto put = [&](const auto& values) {
-    std::copy_n(values.data(), values.size(), out.data());
-    return true;
-  };
-  const auto put_number = [&](double value) {
-    out(0, 0) = value;
-    return true;
-  };
+void MechanismProvider::ReadValues(Term term, Eigen::Ref<MatrixXd> out) const {
+  const auto put = [&](const auto& values) { std::copy_n(values.data(), values.size(), out.data()); };
+  const auto put_number = [&](double value) { out(0, 0) = value; };
   const auto put_each = [&](const auto& member) {
     for (size_t i = 0; i < contacts_.size(); ++i) {
       const auto& values = contacts_[i].*member;
       std::copy_n(values.data(), values.size(), out.col(static_cast<Eigen::Index>(i)).data());
     }
-    return true;
   };
   switch (term) {
     case Term::kKineticEnergy:
@@ -62,8 +46,9 @@ bool MechanismProvider::ReadValues(Term term, Eigen::Ref<MatrixXd> out) const {
       return put_each(&ContactValues::G);
     case Term::kJB:
       for (size_t i = 0; i < contacts_.size(); ++i)
-        CopyColumns(contacts_[i].J_B, static_cast<Eigen::Index>(i) * contacts_[i].J_B.cols(), out);
-      return true;
+        out.middleCols(static_cast<Eigen::Index>(i) * contacts_[i].J_B.cols(), contacts_[i].J_B.cols()) =
+            contacts_[i].J_B;
+      return;
     case Term::kKappaDot:
       return put_each(&ContactValues::relative_twist);
     case Term::kJBDotXi:
@@ -89,7 +74,7 @@ bool MechanismProvider::ReadValues(Term term, Eigen::Ref<MatrixXd> out) const {
     case Term::kCoXoDot:
       return put(object_.C_o_X_o_dot);
     default:
-      return false;
+      return;
   }
 }
 

@@ -115,10 +115,6 @@ struct ContactValues {
   Vector6d relative_twist;  ///< Of the fingertip against the object in Sigma_cf, as kappa_dot has it.
 };
 
-/// Columns of `out` from the `first` on become these: as one piece where both are one, which Eigen's own loop
-/// over columns takes several times as long for.
-void CopyColumns(const Eigen::Ref<const MatrixXd>& columns, Eigen::Index first, Eigen::Ref<MatrixXd> out);
-
 /// A provider that has a whole mechanism: what analytic model and engine share.
 class MechanismProvider : public DynamicsProvider {
  public:
@@ -129,8 +125,8 @@ class MechanismProvider : public DynamicsProvider {
   [[nodiscard]] std::vector<ContactValues>* mutable_contacts() { return &contacts_; }
 
  protected:
-  /// Writes what stands in the members below; false for any other term.
-  bool ReadValues(Term term, Eigen::Ref<MatrixXd> out) const;
+  /// Writes what stands in the members below.
+  void ReadValues(Term term, Eigen::Ref<MatrixXd> out) const;
   /// Whether the members below have it.
   [[nodiscard]] bool HasValue(Term term) const;
   EnergyAndMomentum energy_;

@@ -65,7 +65,6 @@ void EngineProvider::PrepareFrames(std::span<const int> frames, bool contacts) {
     for (ContactValues& contact : contacts_) contact.J_B.setZero(3, terms_.size());
   }
   xi_.setZero(terms_.size());
-  M_.setZero(terms_.size(), terms_.size());
 }
 
 void EngineProvider::SetState(const DynamicsState& state) {
@@ -81,8 +80,6 @@ void EngineProvider::SetState(const VectorXd& q, const VectorXd& xi, const Pose&
                               const ObjectCoordinates* coordinates) {
   xi_ = xi;
   terms_.SetState(q, xi, X_Bo, V_Bo);
-  const double* entry = terms_.mass().data();
-  for (const MassEntry& at : terms_.mass_entries()) M_(at.row, at.col) = *entry++;
   for (size_t i = 0; i < frames_.size(); ++i) terms_.CalcFrameColumns(frames_[i], columns_[i]);
   energy_ = terms_.energy_and_momentum();
   if (has_object_) ReadObject(coordinates);
@@ -137,12 +134,9 @@ void EngineProvider::Read(Term term, Eigen::Ref<MatrixXd> out) {
     case Term::kLinkInertia:
       // A fixed base, which is the first, has nothing to compare.
       for (Eigen::Index i = 1; i <= out.cols(); ++i) {
-        const LinkInWorld& link = links_[links_.size() - static_cast<size_t>(i)];
-        if (term == Term::kLinkCom) {
-          out.col(out.cols() - i) = link.com;
-        } else {
-          out.col(out.cols() - i) = link.inertia.reshaped();
-        }
+        const MassProperties& link = links_[links_.size() - static_cast<size_t>(i)];
+        if (term == Term::kLinkCom) out.col(out.cols() - i) = link.com;
+        if (term == Term::kLinkInertia) out.col(out.cols() - i) = link.inertia.reshaped();
       }
       return;
     case Term::kFramePose:
@@ -162,7 +156,8 @@ void EngineProvider::Read(Term term, Eigen::Ref<MatrixXd> out) {
       out = unreduced_->M();
       return;
     case Term::kMBar:
-      return CopyColumns(M_, 0, out);
+      out = M();
+      return;
     case Term::kCBarXi:
       out = terms_.coriolis();
       return;

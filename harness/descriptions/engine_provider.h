@@ -55,7 +55,7 @@ class EngineProvider : public MechanismProvider {
   [[nodiscard]] EngineTerms& terms() { return terms_; }
   [[nodiscard]] const EngineTerms& terms() const { return terms_; }
   /// M_bar' at the last state.
-  [[nodiscard]] const MatrixXd& M() const { return M_; }
+  [[nodiscard]] const MatrixXd& M() const { return terms_.M(); }
   /// The last of Read(kJ) of a compared frame: 6 x chain, world axes.
   [[nodiscard]] const Matrix6Xd& columns(size_t frame) const { return columns_[frame]; }
 
@@ -71,9 +71,8 @@ class EngineProvider : public MechanismProvider {
   std::unique_ptr<EngineTerms> unreduced_;
   std::vector<int> frames_;  // compared
   std::vector<Matrix6Xd> columns_;
-  std::vector<LinkInWorld> links_;
+  std::vector<MassProperties> links_;
   VectorXd xi_, w_, unreduced_velocity_;
-  MatrixXd M_;
 };
 
 }  // namespace dexcheck

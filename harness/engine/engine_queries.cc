@@ -44,24 +44,16 @@ Vector3d EngineTerms::JointAnchor(int joint) const {
   return MapVector(data_->xanchor + 3 * adapter_->joint_ids()[static_cast<size_t>(joint)]);
 }
 
-std::vector<LinkInWorld> EngineTerms::links() const {
-  const mjModel* m = engine_.get();
-  const mjData* d = data_.get();
-  std::vector<LinkInWorld> links;
+std::vector<MassProperties> EngineTerms::links() const {
+  std::vector<MassProperties> links;
   for (const std::vector<int>& welded : adapter_->welded_bodies()) {
-    LinkInWorld& link = links.emplace_back();
+    std::vector<MassProperties> bodies;
     for (const int body : welded) {
-      link.mass += m->body_mass[body];
-      link.com += m->body_mass[body] * MapVector(d->xipos + 3 * body);
+      const RotationMap R(data_->ximat + 9 * body);
+      bodies.push_back({engine_->body_mass[body], MapVector(data_->xipos + 3 * body),
+                        R * MapVector(engine_->body_inertia + 3 * body).asDiagonal() * R.transpose()});
     }
-    if (link.mass > 0.0) link.com /= link.mass;
-    for (const int body : welded) {
-      const RotationMap R(d->ximat + 9 * body);
-      const Vector3d arm = MapVector(d->xipos + 3 * body) - link.com;
-      // The parallel-axis theorem adds m (|r|^2 1 - r r^T).
-      link.inertia += R * MapVector(m->body_inertia + 3 * body).asDiagonal() * R.transpose() +
-                      m->body_mass[body] * (arm.squaredNorm() * Matrix3d::Identity() - arm * arm.transpose());
-    }
+    links.push_back(Combine(bodies));
   }
   return links;
 }
@@ -129,27 +121,13 @@ EngineMotion EngineTerms::ObjectMotion() const {
 }
 
 Matrix6d EngineTerms::ObjectInertia() const {
-  const mjModel& m = *engine_;
-  Matrix6d M;
-  for (int i = 0; i < 6; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      const int at = FindMassEntry(m, adapter_->object_dof() + i, i - j);
-      M(i, j) = M(j, i) = at < 0 ? 0.0 : GetMassEntries(*data_)[at];
-    }
-  }
   Matrix6d B = Matrix6d::Identity();
   B.topLeftCorner<3, 3>() = ObjectRotation();
-  return B.transpose() * M * B;
+  return B.transpose() * mass_nv_.block<6, 6>(adapter_->object_dof(), adapter_->object_dof()) * B;
 }
 
-Vector6d EngineTerms::ObjectCoriolis() const {
-  Vector6d wrench = object_coriolis_;
-  wrench.head<3>() = ObjectRotation().transpose() * wrench.head<3>().eval();
-  return wrench;
-}
-
-Vector6d EngineTerms::ObjectGravity() const {
-  Vector6d wrench = object_gravity_;
+Vector6d EngineTerms::ObjectForce() const {
+  Vector6d wrench = force_nv_.segment<6>(adapter_->object_dof());
   wrench.head<3>() = ObjectRotation().transpose() * wrench.head<3>().eval();
   return wrench;
 }

@@ -21,13 +21,6 @@ void CalcPassiveForces(const mjModel& model, mjData* data) {
   mj_passive(&model, data);
 }
 
-/// Lists the dofs from `dof` to the root, itself included.
-int CountAncestors(const mjModel& model, int dof) {
-  int count = 0;
-  for (int i = dof; i >= 0; i = model.dof_parentid[i]) ++count;
-  return count;
-}
-
 /// Whether passive forces depend on the places of geoms: tendons wrap around them, a fluid flows about them.
 bool ForcesNeedGeoms(const mjModel& model) {
   const auto is_geom = [](int type) { return type == mjWRAP_SPHERE || type == mjWRAP_CYLINDER; };
@@ -53,9 +46,9 @@ EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates, std::s
   for (const std::vector<int>& welded : adapter.welded_bodies()) {
     robot_bodies_.insert(robot_bodies_.end(), welded.begin(), welded.end());
   }
-  const Eigen::Index base_dofs = map_.base_columns().rows();
   q_.setZero(adapter.model().num_positions());
-  base_mass_.setZero(base_dofs, base_dofs);
+  M_.setZero(n, n);
+  mass_nv_.setZero(nv, nv);
   force_nv_.setZero(nv);
   bracket_nv_.setZero(nv);
   coriolis_.setZero(n);
@@ -64,7 +57,6 @@ EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates, std::s
   other_velocity_.setZero(n);
   other_force_.setZero(n);
   FindObject();
-  ListMassEntries();
   ListChains(frames);
   // Gravity is formed from the masses' places, so that the bias force is Coriolis alone.
   mju_zero(engine_->opt.gravity, 3);
@@ -112,54 +104,7 @@ void EngineTerms::FindTouchingGeoms(std::span<const int> fingertips) {
   }
 }
 
-void EngineTerms::ListMassEntries() {
-  const mjModel& m = *engine_;
-  const int n = map_.size();
-  const std::vector<int>& dofs = adapter_->joint_dofs();
-  std::vector<int> coordinate(static_cast<size_t>(m.nv), -1);
-  for (size_t i = 0; i < dofs.size(); ++i) {
-    coordinate[static_cast<size_t>(dofs[i])] = base_size_ + static_cast<int>(i);
-  }
-  // Address and column of the source of each entry of the whole matrix; without one it is zero.
-  constexpr int kNone = -2;
-  constexpr int kOfBase = -1;
-  Eigen::MatrixXi address = Eigen::MatrixXi::Constant(n, n, kNone);
-  address.topLeftCorner(base_size_, base_size_).setConstant(kOfBase);
-  for (const int dof : dofs) {
-    const int row = coordinate[static_cast<size_t>(dof)];
-    // The base's dofs are at the root.
-    const int root = FindMassEntry(m, dof, CountAncestors(m, dof) - 1);
-    if (root >= 0) address.row(row).head(base_size_).setConstant(root);
-    int steps = 0;
-    for (int other = dof; other >= 0; other = m.dof_parentid[other], ++steps) {
-      const int col = coordinate[static_cast<size_t>(other)];
-      const int at = FindMassEntry(m, dof, steps);
-      if (col >= 0 && at >= 0) address(std::max(row, col), std::min(row, col)) = at;
-    }
-  }
-  Eigen::MatrixXi place = Eigen::MatrixXi::Constant(n, n, -1);
-  for (int col = 0; col < n; ++col) {
-    for (int row = 0; row < n; ++row) {
-      if (address(std::max(row, col), std::min(row, col)) == kNone) continue;
-      place(row, col) = static_cast<int>(mass_entries_.size());
-      mass_entries_.push_back({row, col});
-    }
-  }
-  for (int col = 0; col < n; ++col) {
-    for (int row = col; row < n; ++row) {
-      if (address(row, col) < 0) continue;
-      mass_sources_.push_back(
-          {address(row, col), col < base_size_ ? col : -1, place(row, col), place(col, row)});
-    }
-  }
-  for (int col = 0; col < base_size_; ++col) {
-    for (int row = 0; row < base_size_; ++row) base_places_.push_back(place(row, col));
-  }
-  mass_.setZero(static_cast<Eigen::Index>(mass_entries_.size()));
-}
-
 void EngineTerms::ListChains(std::span<const int> frames) {
-  std::vector<bool> needed(static_cast<size_t>(engine_->nbody), false);
   const std::vector<int>& joint_dofs = adapter_->joint_dofs();
   chains_.resize(adapter_->model().frames().size());
   for (const int frame : frames) {
@@ -167,7 +112,6 @@ void EngineTerms::ListChains(std::span<const int> frames) {
     for (int i = 0; i < base_size_; ++i) chain.coordinates.push_back(i);
     std::vector<bool> moves(static_cast<size_t>(engine_->nv), false);
     for (int body = body_of(frame); body > 0; body = engine_->body_parentid[body]) {
-      needed[static_cast<size_t>(body)] = true;
       for (int k = 0; k < engine_->body_dofnum[body]; ++k)
         moves[static_cast<size_t>(engine_->body_dofadr[body] + k)] = true;
     }
@@ -176,10 +120,6 @@ void EngineTerms::ListChains(std::span<const int> frames) {
       chain.coordinates.push_back(base_size_ + static_cast<int>(i));
       chain.dofs.push_back(joint_dofs[i]);
     }
-  }
-  if (has_object_) needed[static_cast<size_t>(object_body_)] = true;
-  for (int body = 1; body < engine_->nbody; ++body) {
-    if (needed[static_cast<size_t>(body)]) moving_bodies_.push_back(body);
   }
 }
 
@@ -224,45 +164,32 @@ void EngineTerms::SetVelocities(const Eigen::Ref<const VectorXd>& q,
 }
 
 void EngineTerms::CalcMass() {
-  const mjModel& m = *engine_;
-  const mjtNum* const entries = GetMassEntries(*data_);
+  ExpandMass(*engine_, *data_, mass_nv_.data());
   const MatrixXd& T = map_.base_columns();
-  const std::vector<int>& dofs = map_.base_dofs();
-  // T^T M T among the base and the wheels, which hang on it.
-  for (Eigen::Index i = 0; i < base_mass_.rows(); ++i) {
-    const int dof = dofs[static_cast<size_t>(i)];
-    int steps = 0;
-    for (int other = dof; other >= 0; other = m.dof_parentid[other], ++steps) {
-      const Eigen::Index j = other == dof ? i : other - dofs[0];
-      const int at = FindMassEntry(m, dof, steps);
-      base_mass_(i, j) = base_mass_(j, i) = at < 0 ? 0.0 : entries[at];
-    }
-  }
-  auto place = base_places_.begin();
-  for (int col = 0; col < base_size_; ++col) {
-    for (int row = 0; row < base_size_; ++row) {
+  const int* const base = map_.base_dofs().data();
+  const int* const joints = adapter_->joint_dofs().data();
+  for (Eigen::Index col = 0; col < base_size_; ++col) {
+    for (Eigen::Index row = 0; row < base_size_; ++row) {
       double sum = 0.0;
-      for (Eigen::Index j = 0; j < T.rows(); ++j) sum += base_mass_.col(j).dot(T.col(row)) * T(j, col);
-      mass_[*place++] = sum;
+      for (Eigen::Index j = 0; j < T.rows(); ++j) {
+        double momentum = 0.0;
+        for (Eigen::Index i = 0; i < T.rows(); ++i) momentum += mass_nv_(base[i], base[j]) * T(i, row);
+        sum += momentum * T(j, col);
+      }
+      M_(row, col) = sum;
     }
   }
-  for (const MassSource& source : mass_sources_) {
-    double entry = entries[source.address];
-    if (source.column >= 0) {
-      entry = 0.0;
-      for (int k = 0; k < carrying_dofs_; ++k)
-        entry += entries[source.address - kTowardRoot * k] * T(k, source.column);
+  for (Eigen::Index row = base_size_; row < M_.rows(); ++row) {
+    const int dof = joints[row - base_size_];
+    for (Eigen::Index col = 0; col < base_size_; ++col) {
+      double sum = 0.0;
+      // The wheels carry no joints.
+      for (int k = 0; k < carrying_dofs_; ++k) sum += mass_nv_(dof, base[k]) * T(k, col);
+      M_(row, col) = M_(col, row) = sum;
     }
-    mass_[source.place] = mass_[source.mirror] = entry;
+    for (Eigen::Index col = base_size_; col < M_.rows(); ++col)
+      M_(row, col) = mass_nv_(dof, joints[col - base_size_]);
   }
-}
-
-MatrixXd EngineTerms::M() const {
-  MatrixXd M = MatrixXd::Zero(size(), size());
-  for (size_t i = 0; i < mass_entries_.size(); ++i) {
-    M(mass_entries_[i].row, mass_entries_[i].col) = mass_[static_cast<Eigen::Index>(i)];
-  }
-  return M;
 }
 
 void EngineTerms::CalcForces() {
@@ -270,7 +197,7 @@ void EngineTerms::CalcForces() {
   mjData* d = data_.get();
   CalcBiasForce();
   map_.ProjectForce(force_nv_.data(), coriolis_);
-  if (has_object_) object_coriolis_ = force_nv_.segment<6>(adapter_->object_dof());
+  if (has_object_) object_coriolis_ = ObjectForce();
 
   // A dof moves its subtree's centre of mass by v + omega x p, both about the whole tree's centre of mass.
   const Vector3d g = MapVector(adapter_->engine().opt.gravity);
@@ -282,7 +209,7 @@ void EngineTerms::CalcForces() {
     force_nv_[i] = -m->body_subtreemass[body] * g.dot(moved);
   }
   map_.ProjectForce(force_nv_.data(), gravity_);
-  if (has_object_) object_gravity_ = force_nv_.segment<6>(adapter_->object_dof());
+  if (has_object_) object_gravity_ = ObjectForce();
 
   CalcPassiveForces(*m, d);
   map_.ProjectForce(d->qfrc_passive, friction_);
@@ -326,7 +253,7 @@ void EngineTerms::CalcBodyAccelerations() {
   const mjModel& m = *engine_;
   mjData* d = data_.get();
   mju_zero(d->cacc, 6);
-  for (const int body : moving_bodies_) {
+  for (int body = 1; body < m.nbody; ++body) {
     Eigen::Map<Vector6d> a(d->cacc + 6 * body);
     a = Eigen::Map<const Vector6d>(d->cacc + 6 * m.body_parentid[body]);
     for (int k = 0; k < m.body_dofnum[body]; ++k) {

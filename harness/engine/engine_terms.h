@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "controller/dynamics/term_types.h"
+#include "controller/model/rigid_body.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/velocity_map.h"
 
@@ -31,24 +32,11 @@ struct EngineTouch {
   Vector3d normal = Vector3d::Zero();    ///< From the fingertip into the object, world.
 };
 
-/// Entry of M_bar', row >= col.
-struct MassEntry {
-  int row;
-  int col;
-};
-
-/// Mass properties of a link at the state set: centre of mass, and inertia about it, in world axes.
-struct LinkInWorld {
-  double mass = 0.0;
-  Vector3d com = Vector3d::Zero();
-  Matrix3d inertia = Matrix3d::Zero();
-};
-
 /// The engine's own values of the analytic model's terms, in the same coordinates. Works in a private copy of
 /// the engine's model and data, at states without tilt and with rolling wheels, so that a disagreement is a
-/// disagreement of models. Only entries that can differ from zero by the engine's tree are formed, which is
-/// fast enough for every step of a run; whole matrices are expanded from them. Functions that are const, or
-/// have "whole" in their description, are for single states. The others do not allocate after construction.
+/// disagreement of models. Only a Jacobian's columns that can differ from zero by the engine's tree are
+/// formed, which is fast enough for every step of a run. Functions that return a matrix by value or have
+/// "whole" in their description are for single states. The others do not allocate after construction.
 class EngineTerms {
  public:
   /// Evaluates all frames, and the object if there is one that moves by a free joint; no contacts.
@@ -67,11 +55,8 @@ class EngineTerms {
 
   /// Number n of velocity coordinates.
   [[nodiscard]] int size() const { return map_.size(); }
-  /// T^T M T: entries that can differ from zero, column by column, and their values.
-  [[nodiscard]] const std::vector<MassEntry>& mass_entries() const { return mass_entries_; }
-  [[nodiscard]] const VectorXd& mass() const { return mass_; }
-  /// The whole matrix, n x n.
-  [[nodiscard]] MatrixXd M() const;
+  /// T^T M T, n x n.
+  [[nodiscard]] const MatrixXd& M() const { return M_; }
   /// Coriolis and centrifugal forces T^T (bias(q, qvel) without gravity + M T_dot velocity) = C velocity.
   [[nodiscard]] const VectorXd& coriolis() const { return coriolis_; }
   /// T^T of the weights that each dof moves.
@@ -88,8 +73,8 @@ class EngineTerms {
   /// Energy and momentum of the robot.
   [[nodiscard]] const EnergyAndMomentum& energy_and_momentum() const { return energy_; }
 
-  /// Links, base first.
-  [[nodiscard]] std::vector<LinkInWorld> links() const;
+  /// Links in the world, base first.
+  [[nodiscard]] std::vector<MassProperties> links() const;
   /// Axis of a joint (of a ball joint the x, y or z axis of its body) and a point on it, world frame.
   [[nodiscard]] Vector3d JointAxis(int joint, int column = 2) const;
   [[nodiscard]] Vector3d JointAnchor(int joint) const;
@@ -114,9 +99,9 @@ class EngineTerms {
   [[nodiscard]] EngineMotion ObjectMotion() const;
   [[nodiscard]] Matrix6d ObjectInertia() const;
   /// C_hat V_Bo.
-  [[nodiscard]] Vector6d ObjectCoriolis() const;
+  [[nodiscard]] const Vector6d& ObjectCoriolis() const { return object_coriolis_; }
   /// N_o.
-  [[nodiscard]] Vector6d ObjectGravity() const;
+  [[nodiscard]] const Vector6d& ObjectGravity() const { return object_gravity_; }
   /// Rows of a point's velocity by V_Bo, world axes.
   [[nodiscard]] Eigen::Matrix<double, 3, 6> CalcObjectJacobian(const Vector3d& point) const;
 
@@ -142,7 +127,6 @@ class EngineTerms {
   void FindTouchingGeoms(std::span<const int> fingertips);
   /// Keeps the engine from placing geoms in every state, unless a force depends on them.
   void DropGeoms();
-  void ListMassEntries();
   void ListChains(std::span<const int> frames);
   void SetPositions(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo);
   void SetVelocities(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
@@ -155,6 +139,8 @@ class EngineTerms {
   void CalcEnergyAndMomentum();
   [[nodiscard]] EngineMotion ReadMotion(mjtObj type, int id, const mjtNum* place) const;
   [[nodiscard]] Matrix3d ObjectRotation() const;
+  /// The object's part of force_nv_, in Sigma_o.
+  [[nodiscard]] Vector6d ObjectForce() const;
 
   const Adapter* adapter_;
   MjModelPtr engine_;  // without gravity; places no geoms unless forces need them
@@ -164,32 +150,20 @@ class EngineTerms {
   int carrying_dofs_;  // the base's without the wheels
   VectorXd q_;
 
-  /// An entry of M_bar' among the joints (column -1) or with a column of the base, at two places in mass_:
-  /// its own and its mirror image's. The address (FindMassEntry) belongs to the entry, or to the joint's
-  /// entry with the base's first dof; the following dofs' entries are before it.
-  struct MassSource {
-    int address;
-    int column;
-    Eigen::Index place, mirror;
-  };
-  std::vector<MassEntry> mass_entries_;
-  std::vector<MassSource> mass_sources_;
-  std::vector<Eigen::Index> base_places_;  // base_size x base_size, column by column
-  VectorXd mass_;
-  MatrixXd base_mass_;  // scratch, among base_dofs
+  MatrixXd M_;
+  MatrixXd mass_nv_;  // scratch: of all the engine's dofs
   VectorXd force_nv_, bracket_nv_;
   VectorXd coriolis_, gravity_, friction_;
   VectorXd other_velocity_, other_force_;  // scratch of CalcCoriolisProduct
   EnergyAndMomentum energy_;
 
   std::vector<int> robot_bodies_;
-  std::vector<int> moving_bodies_;  // those whose accelerations are needed, parents first
-  std::vector<Chain> chains_;       // by frame; empty unless requested
+  std::vector<Chain> chains_;  // by frame; empty unless requested
 
   int object_body_;
   bool has_object_ = false;
   std::vector<int> object_geoms_;
-  Vector6d object_coriolis_ = Vector6d::Zero();  // in the engine's coordinates
+  Vector6d object_coriolis_ = Vector6d::Zero();
   Vector6d object_gravity_ = Vector6d::Zero();
 };
 
