@@ -375,17 +375,4 @@ RobotDescription ParseUrdf(std::string_view text, const std::string& source, con
   return robot;
 }
 
-std::map<std::string, double> ReadUrdfLimits(std::string_view text, const std::string& source,
-                                             const char* attribute) {
-  const UrdfFile file(text, source);
-  std::map<std::string, double> limits;
-  for (const UrdfJoint& joint : file.joints()) {
-    const tinyxml2::XMLElement* const limit = joint.element->FirstChildElement("limit");
-    if (limit == nullptr) continue;
-    const double most = file.ReadNumber(*limit, "joint " + Quote(joint.name) + ": ", attribute, 0.0);
-    if (most > 0.0) limits[joint.name] = most;
-  }
-  return limits;
-}
-
 }  // namespace dexcheck

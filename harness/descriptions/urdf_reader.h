@@ -3,7 +3,6 @@
 // A robot from a URDF, by this project's own code: the engine's importer is itself a suspect.
 
 #include <filesystem>
-#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,10 +28,5 @@ struct UrdfOptions {
 /// joint's.
 /// @throws InputError, one line that names file, line, part and value.
 RobotDescription ParseUrdf(std::string_view text, const std::string& source, const UrdfOptions& options = {});
-
-/// An attribute of each joint's <limit> that is above 0, by name: the largest "effort", N or N m, or
-/// "velocity", m/s or rad/s. @throws as ParseUrdf.
-std::map<std::string, double> ReadUrdfLimits(std::string_view text, const std::string& source,
-                                             const char* attribute);
 
 }  // namespace dexcheck

@@ -129,9 +129,7 @@ std::vector<XMLElement*> ListBodies(const MjcfFile& mjcf) {
   // The engine numbers bodies from the root on, each before its children.
   std::vector<XMLElement*> bodies = {nullptr};
   for (XMLElement* world : ListChildren(mjcf.root(), "worldbody")) {
-    VisitElements(world, [&](XMLElement* element) {
-      if (std::string_view(element->Name()) == "body") bodies.push_back(element);
-    });
+    for (XMLElement* body : ListElements(world, "body")) bodies.push_back(body);
   }
   return bodies;
 }

@@ -136,10 +136,8 @@ MjModelPtr LoadDocument(const MjcfFile& mjcf) {
 /// Keeps entries of M that are zero for the compiled masses, since the masses may be changed.
 void LeaveBodiesGeneral(MjcfFile* mjcf) {
   if (!kHasSimpleBodies) return;
-  VisitElements(mjcf->root(), [](tinyxml2::XMLElement* element) {
-    if (std::string_view(element->Name()) == "body" && element->Attribute("simple") == nullptr)
-      element->SetAttribute("simple", "false");
-  });
+  for (tinyxml2::XMLElement* body : ListElements(mjcf->root(), "body"))
+    if (body->Attribute("simple") == nullptr) body->SetAttribute("simple", "false");
 }
 
 /// @param load loads the file when nothing need be changed.

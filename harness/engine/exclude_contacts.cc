@@ -205,6 +205,16 @@ void KeepMechanism(MjcfFile* mjcf) {
 
 namespace {
 
+std::vector<XMLElement*> ListFreeJoints(MjcfFile* mjcf) {
+  std::vector<XMLElement*> joints;
+  VisitElements(mjcf->root(), [&](XMLElement* element) {
+    const std::string_view kind = element->Name();
+    if (kind == "freejoint" || (kind == "joint" && ReadAttribute(*element, "type") == "free"))
+      joints.push_back(element);
+  });
+  return joints;
+}
+
 /// Deletes the elements that refer to one of these names.
 void DeleteNaming(const std::set<std::string>& names, MjcfFile* mjcf) {
   DeleteInSections(mjcf->root(), {"actuator", "sensor", "contact"}, [&](const XMLElement& part) {
@@ -219,18 +229,15 @@ void DeleteNaming(const std::set<std::string>& names, MjcfFile* mjcf) {
 
 void LeaveOutOthers(const mjModel& engine, MjcfFile* mjcf) {
   const RobotTree robot = FindRobotTree(engine, mjcf->source());
-  std::vector<XMLElement*> others, free_joints;
-  VisitElements(mjcf->root(), [&](XMLElement* element) {
-    const std::string_view kind = element->Name();
-    if (kind == "body" &&
-        std::ranges::find(robot.others, ReadAttribute(*element, "name")) != robot.others.end())
-      others.push_back(element);
-    if (kind == "joint" && ReadAttribute(*element, "type") == "free") free_joints.push_back(element);
+  std::vector<XMLElement*> others = ListElements(mjcf->root(), "body");
+  std::erase_if(others, [&](const XMLElement* body) {
+    return std::ranges::find(robot.others, ReadAttribute(*body, "name")) == robot.others.end();
   });
   const int dof = robot.floating_body == 0 ? -1 : engine.body_dofadr[robot.floating_body];
   if (dof >= 0 && (engine.dof_damping[dof] != 0.0 || engine.dof_armature[dof] != 0.0 ||
                    engine.dof_frictionloss[dof] != 0.0)) {
-    for (XMLElement* joint : free_joints) {
+    for (XMLElement* joint : ListFreeJoints(mjcf)) {
+      if (std::string_view(joint->Name()) == "freejoint") continue;
       mjcf->Note(*joint, "<joint type=\"free\">", "without the damping, armature and friction of a joint");
       for (const char* word : {"damping", "armature", "frictionloss"}) joint->SetAttribute(word, "0");
     }
@@ -248,13 +255,7 @@ void LeaveOutOthers(const mjModel& engine, MjcfFile* mjcf) {
 }
 
 void HoldBase(double lift, MjcfFile* mjcf) {
-  std::vector<XMLElement*> joints;
-  VisitElements(mjcf->root(), [&](XMLElement* element) {
-    const std::string_view kind = element->Name();
-    if (kind == "freejoint" || (kind == "joint" && ReadAttribute(*element, "type") == "free"))
-      joints.push_back(element);
-  });
-  for (XMLElement* joint : joints) {
+  for (XMLElement* joint : ListFreeJoints(mjcf)) {
     XMLElement* const body = joint->Parent()->ToElement();
     Vector3d p = Vector3d::Zero();
     std::istringstream(ReadAttribute(*body, "pos", "0 0 0")) >> p[0] >> p[1] >> p[2];
@@ -277,10 +278,8 @@ MjModelPtr LoadWithRoom(const std::filesystem::path& mjcf, size_t pairs) {
   MjcfFile document(mjcf);
   tinyxml2::XMLElement* geom = nullptr;
   for (tinyxml2::XMLElement* world : ListChildren(document.root(), "worldbody")) {
-    VisitElements(world, [&](tinyxml2::XMLElement* element) {
-      const bool is_named = element->Attribute("name") != nullptr;
-      if (std::string_view(element->Name()) == "geom" && is_named) geom = element;
-    });
+    for (tinyxml2::XMLElement* element : ListElements(world, "geom"))
+      if (element->Attribute("name") != nullptr) geom = element;
   }
   for (size_t i = 0; geom != nullptr && i < pairs; ++i)
     SetAttributes({{"geom1", geom->Attribute("name")}, {"geom2", geom->Attribute("name")}},

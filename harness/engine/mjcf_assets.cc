@@ -205,9 +205,7 @@ void AdaptMjcf(MjcfFile* mjcf) {
 
 std::vector<AssetFile> ListAssetFiles(XMLElement* root) {
   AssetFolders folders;
-  VisitElements(root, [&](XMLElement* element) {
-    if (Is(*element, "compiler")) folders.Read(*element);
-  });
+  for (const XMLElement* compiler : ListElements(root, "compiler")) folders.Read(*compiler);
   std::vector<AssetFile> files;
   const auto add = [&](XMLElement* element, const char* attribute, const std::string& folder) {
     if (const char* const name = element->Attribute(attribute))

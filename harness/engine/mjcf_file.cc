@@ -15,15 +15,6 @@ namespace {
 using tinyxml2::XMLElement;
 using tinyxml2::XMLNode;
 
-/// The first <include> at or below an element, in the order of the file.
-XMLElement* FindInclude(XMLElement* root) {
-  XMLElement* found = nullptr;
-  VisitElements(root, [&](XMLElement* element) {
-    if (found == nullptr && std::string_view(element->Name()) == "include") found = element;
-  });
-  return found;
-}
-
 bool LiesInside(const std::filesystem::path& file) {
   return !file.is_absolute() && (file.empty() || *file.begin() != "..");
 }
@@ -75,7 +66,8 @@ MjcfFile::MjcfFile(const std::filesystem::path& file, const std::string* text)
     : source_(file.string()), folder_(MakeAbsolute(file).parent_path()) {
   Parse(text != nullptr ? *text : ReadBytes(file));
   if (IsUrdf()) return;
-  while (XMLElement* const include = FindInclude(root_)) Splice(include);
+  for (auto open = ListElements(root_, "include"); !open.empty(); open = ListElements(root_, "include"))
+    Splice(open.front());
   // An asset that is not where the loaded file has it is looked for beside the file that names it.
   for (const AssetFile& asset : ListAssetFiles(root_)) {
     NoteInput(folder_ / asset.path);
@@ -197,11 +189,11 @@ std::string MjcfFile::PrintFor(const std::filesystem::path& folder) const {
   };
   for (const char* name : {"meshdir", "texturedir"}) {
     bool is_stated = false;
-    VisitElements(root, [&](XMLElement* element) {
-      if (std::string_view(element->Name()) != "compiler" || element->Attribute(name) == nullptr) return;
-      move(element, name);
+    for (XMLElement* compiler : ListElements(root, "compiler")) {
+      if (compiler->Attribute(name) == nullptr) continue;
+      move(compiler, name);
       is_stated = true;
-    });
+    }
     // Without such a folder, files are looked for in the MJCF's own.
     if (!is_stated) move(RequireSection(root, "compiler"), name);
   }

@@ -211,17 +211,13 @@ class Downgrade {
   void ReplaceCollision(XMLElement* option) {
     const std::string value = option->Attribute("collision");
     option->DeleteAttribute("collision");
-    VisitElements(mjcf_.root(), [&](XMLElement* element) {
-      const std::string_view name = element->Name();
-      if (value == "dynamic" && name == "contact") {
-        for (XMLElement* pair : ListChildren(element, "pair")) element->DeleteChild(pair);
-      }
-      if (value != "predefined" || name != "worldbody") return;
-      VisitElements(element, [](XMLElement* geom) {
-        if (std::string_view(geom->Name()) != "geom") return;
+    for (XMLElement* contact : ListElements(mjcf_.root(), "contact"))
+      DeleteChildren(contact, "pair", [&](const XMLElement&) { return value == "dynamic"; });
+    if (value != "predefined") return;
+    for (XMLElement* world : ListElements(mjcf_.root(), "worldbody")) {
+      for (XMLElement* geom : ListElements(world, "geom"))
         for (const char* mask : {"contype", "conaffinity"}) geom->SetAttribute(mask, "0");
-      });
-    });
+    }
   }
 
   /// Each mesh says by itself how its inertia is computed.

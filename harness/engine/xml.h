@@ -72,6 +72,16 @@ void VisitElements(Element* root, const Visit& visit) {
   }
 }
 
+/// The elements of one name at or below an element, in the order of the file, as they are now.
+template <typename Element>
+std::vector<Element*> ListElements(Element* root, std::string_view name) {
+  std::vector<Element*> elements;
+  VisitElements(root, [&](Element* element) {
+    if (element->Name() == name) elements.push_back(element);
+  });
+  return elements;
+}
+
 inline std::string ReadAttribute(const tinyxml2::XMLElement& element, const char* name,
                                  const std::string& otherwise = "") {
   const char* const value = element.Attribute(name);

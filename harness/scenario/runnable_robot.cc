@@ -104,14 +104,12 @@ std::vector<Joint> ReduceFriction(const std::string& source, RobotDescription* r
 
 /// Writes the friction of joints into their elements, whatever their classes have.
 void StateFriction(const std::vector<Joint>& joints, MjcfFile* mjcf) {
-  VisitElements(mjcf->root(), [&](XMLElement* element) {
-    if (std::string_view(element->Name()) != "joint") return;
-    for (const Joint& joint : joints) {
-      if (ReadAttribute(*element, "name") != joint.name) continue;
-      element->SetAttribute("damping", FormatNumber(joint.damping).c_str());
-      element->SetAttribute("frictionloss", FormatNumber(joint.dry_friction).c_str());
-    }
-  });
+  for (XMLElement* element : ListElements(mjcf->root(), "joint")) {
+    const Joint* const joint = FindIn(joints, ReadAttribute(*element, "name"), &Joint::name);
+    if (joint == nullptr) continue;
+    element->SetAttribute("damping", FormatNumber(joint->damping).c_str());
+    element->SetAttribute("frictionloss", FormatNumber(joint->dry_friction).c_str());
+  }
 }
 
 /// A run's law has one number for each joint.
@@ -160,8 +158,13 @@ RunnableRobot ReadRunnableRobot(const fs::path& file, const fs::path& mjcf) {
     throw InputError(source + ": must be a URDF or an MJCF, is a parameter file");
   made.robot = ParseUrdf(text, source);
   RequireJoints(source, made.robot);
-  made.rates = ReadUrdfLimits(text, source, "velocity");
-  const std::map<std::string, double> limits = ReadUrdfLimits(text, source, "effort");
+  std::map<std::string, double> limits;
+  for (size_t i = 0; i < made.robot.joints.size(); ++i) {
+    const DescribedJoint& joint = made.robot.joints[i];
+    const std::string& name = made.robot.spec.joints[i].name;
+    if (joint.velocity_limit > 0.0) made.rates[name] = joint.velocity_limit;
+    if (joint.forces) limits[name] = joint.forces->upper;
+  }
   if (!mjcf.empty()) {
     made.mjcf = AdaptForRun(mjcf, limits);
     // A URDF need not say how its root moves; the MJCF does.
@@ -178,11 +181,8 @@ RunnableRobot ReadRunnableRobot(const fs::path& file, const fs::path& mjcf) {
 }
 
 void AddSky(MjcfFile* mjcf) {
-  bool has_sky = false;
-  VisitElements(mjcf->root(), [&](XMLElement* element) {
-    has_sky |= std::string_view(element->Name()) == "texture" && ReadAttribute(*element, "type") == "skybox";
-  });
-  if (has_sky) return;
+  for (const XMLElement* texture : ListElements(mjcf->root(), "texture"))
+    if (ReadAttribute(*texture, "type") == "skybox") return;
   XMLElement* const sky = RequireSection(mjcf->root(), "asset")->InsertNewChildElement("texture");
   SetAttributes({{"type", "skybox"},
                  {"builtin", "gradient"},

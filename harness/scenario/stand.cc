@@ -80,11 +80,8 @@ std::vector<Place> KeepOutermost(const std::vector<Place>& places) {
 /// The element of a body.
 XMLElement* FindBody(const mjModel& m, int body, MjcfFile* mjcf) {
   XMLElement* found = nullptr;
-  VisitElements(mjcf->root(), [&](XMLElement* element) {
-    if (std::string_view(element->Name()) == "body" &&
-        ReadAttribute(*element, "name") == NameOf(m, mjOBJ_BODY, body))
-      found = element;
-  });
+  for (XMLElement* element : ListElements(mjcf->root(), "body"))
+    if (ReadAttribute(*element, "name") == NameOf(m, mjOBJ_BODY, body)) found = element;
   if (found == nullptr) throw InputError(mjcf->source() + ": a body that is a foot must have a name");
   return found;
 }
