@@ -25,6 +25,7 @@
 #include "harness/cli/commands.h"
 #include "harness/cli/report.h"
 #include "harness/cli/run_folder.h"
+#include "harness/comparison/term_comparison.h"
 #include "harness/descriptions/analytic_provider.h"
 #include "harness/descriptions/engine_provider.h"
 #include "harness/descriptions/read_description.h"
@@ -363,7 +364,18 @@ struct EvalRequest {
 void WriteStates(const EvalRequest& request) {
   const std::filesystem::path folder = request.out;
   const RobotDescription robot = ReadDescription(request.robot, request.urdf);
-  const StateTable states = DrawStates(robot, request.states, {}, request.seed);
+  const RobotModel model(robot.spec);
+  DynamicsState state;
+  state.q.setZero(model.num_positions());
+  state.xi.setZero(model.num_velocities());
+  const auto rows = static_cast<size_t>(request.states);
+  StateTable states{{{rows, static_cast<size_t>(state.q.size())}, {}},
+                    {{rows, static_cast<size_t>(state.xi.size())}, {}}};
+  for (const StateFeed feed = FeedRandomStates(model, request.states, {}, request.seed); feed(&state);
+       ++state.sample) {
+    states.q.values.insert(states.q.values.end(), state.q.begin(), state.q.end());
+    states.v.values.insert(states.v.values.end(), state.xi.begin(), state.xi.end());
+  }
   MakeFolder(folder);
   const auto write = [&](const char* name, const std::string& text) {
     OutputFile file(folder / name);

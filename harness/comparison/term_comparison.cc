@@ -48,7 +48,10 @@ TermComparison::TermComparison(const RobotModel& model, Asker asker, std::vector
     is_reduced_ = is_reduced_ || provider->is_reduced();
     has_own_level_ = has_own_level_ || provider->has_own_level();
   }
-  if (is_reduced_) FormCoupling();
+  if (is_reduced_) {
+    T_ = CalcCouplingMap(model);
+    free_ = ListFreeVelocities(model);
+  }
   for (const TermEntry& entry : ListTerms()) {
     if ((entry.askers & asker) == 0) continue;
     // A program states the terms that it has only with its first result.
@@ -77,18 +80,6 @@ TermComparison::TermComparison(const RobotModel& model, Asker asker, std::vector
         record.bound = CalcBound(entry, model.max_depth());
       }
     }
-  }
-}
-
-void TermComparison::FormCoupling() {
-  const std::vector<Joint>& joints = model().joints();
-  const MatrixXd of_joints = CalcCouplingMap(model().spec());
-  const int base = model().num_base_velocities();
-  T_.setZero(model().num_velocities(), base + of_joints.cols());
-  T_.topLeftCorner(base, base).setIdentity();
-  T_.bottomRightCorner(of_joints.rows(), of_joints.cols()) = of_joints;
-  for (int i = 0; i < model().num_velocities(); ++i) {
-    if (i < base || !joints[static_cast<size_t>(model().joint_of_dof(i - base))].coupling) free_.push_back(i);
   }
 }
 

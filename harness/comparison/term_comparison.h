@@ -103,7 +103,6 @@ class TermComparison {
     MatrixXd scale, weight;         ///< 1 / scale
     long count = -1;                ///< Numbers compared; not known before the first state.
   };
-  void FormCoupling();
   [[nodiscard]] bool Shares(const TermEntry& entry, size_t a, size_t b) const;
   void Read(AskedTerm* term, size_t provider);
   void Weigh(AskedTerm* term);

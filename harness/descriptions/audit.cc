@@ -57,7 +57,7 @@ Bodies MakePossible(const RobotSpec& spec) {
 }
 
 /// Median over random states of the condition number of M.
-double CalcCondition(const RobotDescription& robot, const RobotSpec& spec) {
+double CalcCondition(const RobotSpec& spec) {
   Bodies bodies = MakePossible(spec);
   // M is linear in the inertias: those that no body can have are added by the Jacobians of their links.
   std::vector<std::pair<int, Matrix3d>> added;
@@ -79,11 +79,7 @@ double CalcCondition(const RobotDescription& robot, const RobotSpec& spec) {
   Matrix6Xd J(6, n);
   Matrix6Xd J_dot(6, n);
   // Coupled joints are one coordinate.
-  const MatrixXd couplings = CalcCouplingMap(robot.spec);
-  const int base = model.num_base_velocities();
-  MatrixXd T = MatrixXd::Zero(n, base + couplings.cols());
-  T.topLeftCorner(base, base).setIdentity();
-  T.bottomRightCorner(couplings.rows(), couplings.cols()) = couplings;
+  const MatrixXd T = CalcCouplingMap(model);
   std::vector<double> conditions;
   for (int state = 0; state < kStates; ++state) {
     source.DrawPositions(&q);
@@ -268,7 +264,7 @@ class JointAudit {
 
 /// Condition numbers, with and without each finding about a body.
 void AuditCondition(const RobotDescription& robot, AuditResult* result) {
-  result->condition = CalcCondition(robot, robot.spec);
+  result->condition = CalcCondition(robot.spec);
   std::map<int, double> without;  // by body
   for (AuditFinding& finding : result->findings) {
     const bool is_moving =
@@ -277,7 +273,7 @@ void AuditCondition(const RobotDescription& robot, AuditResult* result) {
     if (!without.contains(finding.body)) {
       RobotSpec spec = robot.spec;
       BodyOf(spec, finding.body) = MakePlausibleBody(BodyOf(spec, finding.body));
-      without[finding.body] = CalcCondition(robot, spec);
+      without[finding.body] = CalcCondition(spec);
     }
     finding.condition_without = without[finding.body];
   }

@@ -55,14 +55,14 @@ std::string FormatAngles(const Vector3d& angles) {
 }
 
 /// ", xyz = ..., rpy = ...": what is not zero; always xyz when `always`.
-std::string FormatPose(const Pose& X, bool always) {
+std::string FormatPose(const Pose& X, bool always, const std::string& between = ", ") {
   const Vector3d xyz = X.translation();
   const Vector3d rpy = CalcRollPitchYaw(X.linear());
   std::string text;
   // Lengths of a robot are of size 1 m; smaller ones keep their digits.
   const double length = xyz.norm();
-  if (always || length > 0.0) text += ", xyz = " + FormatTidyList(xyz, length);
-  if (rpy.norm() > kPrintedRounding) text += ", rpy = " + FormatAngles(rpy);
+  if (always || length > 0.0) text += between + "xyz = " + FormatTidyList(xyz, length);
+  if (rpy.norm() > kPrintedRounding) text += between + "rpy = " + FormatAngles(rpy);
   return text;
 }
 
@@ -163,10 +163,7 @@ class ParameterWriter {
   void WriteFrame(const Frame& frame) {
     const Pose X_WF = PlaceOnAxis(robot_, frame.link).inverse() * frame.X_LF;
     text_ += "[[frame]]\nname = " + QuoteToml(frame.name) +
-             "\nlink = " + QuoteToml(LinkOf(spec_, frame.link)) + "\n";
-    const Vector3d rpy = CalcRollPitchYaw(X_WF.linear());
-    text_ += "xyz = " + FormatTidyList(X_WF.translation(), X_WF.translation().norm()) + "\n";
-    if (rpy.norm() > kPrintedRounding) text_ += "rpy = " + FormatAngles(rpy) + "\n";
+             "\nlink = " + QuoteToml(LinkOf(spec_, frame.link)) + FormatPose(X_WF, true, "\n") + "\n";
     if (frame.sphere_radius) text_ += "sphere_radius = " + FormatNumber(*frame.sphere_radius) + "\n";
     text_ += "\n";
   }

@@ -130,40 +130,25 @@ class MjcfDescriptionReader {
   }
 
   [[nodiscard]] DescribedShape ReadGeom(int geom) const {
-    DescribedShape shape;
-    const mjtNum* size = engine_.geom_size + 3 * geom;
-    Vector3d half(size[0], size[0], size[0]);
-    const int type = engine_.geom_type[geom];
+    const Vector3d size = MapVector(engine_.geom_size + 3 * geom);
     const Pose X_LG = ReadPose(engine_.geom_pos + 3 * geom, engine_.geom_quat + 4 * geom);
-    if (type == mjGEOM_SPHERE || type == mjGEOM_CAPSULE || type == mjGEOM_CYLINDER) shape.radius = size[0];
-    if (type == mjGEOM_CAPSULE || type == mjGEOM_CYLINDER) shape.axis = X_LG.linear().col(2);
-    switch (type) {
+    const auto describe = [&](ShapeKind kind, const Vector3d& half) {
+      return DescribeShape(kind, half, X_LG);
+    };
+    switch (engine_.geom_type[geom]) {
       case mjGEOM_SPHERE:
-        shape.volume = 4.0 / 3.0 * kPi * size[0] * size[0] * size[0];
-        break;
+        return describe(ShapeKind::kEllipsoid, Vector3d::Constant(size[0]));
       case mjGEOM_CAPSULE:
-        half[2] += size[1];
-        shape.volume = kPi * size[0] * size[0] * (2.0 * size[1] + 4.0 / 3.0 * size[0]);
-        break;
+        return describe(ShapeKind::kCapsule, {size[0], size[0], size[0] + size[1]});
       case mjGEOM_CYLINDER:
-        half[2] = size[1];
-        shape.volume = kPi * size[0] * size[0] * 2.0 * size[1];
-        break;
+        return describe(ShapeKind::kCylinder, {size[0], size[0], size[1]});
       case mjGEOM_ELLIPSOID:
-        half = MapVector(size);
-        shape.volume = 4.0 / 3.0 * kPi * half.prod();
-        break;
+        return describe(ShapeKind::kEllipsoid, size);
       case mjGEOM_BOX:
-        half = MapVector(size);
-        shape.volume = 8.0 * half.prod();
-        break;
-      default:
-        half.setConstant(engine_.geom_rbound[geom]);  // a mesh: around it
+        return describe(ShapeKind::kBox, size);
+      default:  // a mesh: around it
+        return describe(ShapeKind::kMesh, Vector3d::Constant(engine_.geom_rbound[geom]));
     }
-    const Vector3d around = X_LG.linear().cwiseAbs() * half;
-    shape.low = X_LG.translation() - around;
-    shape.high = X_LG.translation() + around;
-    return shape;
   }
 
   /// @param place of the body before this joint. @return its place behind it.

@@ -36,25 +36,6 @@ ProgramLayout ReadLayout(const std::filesystem::path& path, const RobotDescripti
 
 }  // namespace
 
-StateTable DrawStates(const RobotDescription& robot, long count, const StateRange& range,
-                      std::uint64_t seed) {
-  const RobotModel model(robot.spec);
-  const auto rows = static_cast<size_t>(count);
-  const auto positions = static_cast<size_t>(model.num_positions());
-  const auto velocities = static_cast<size_t>(model.num_velocities());
-  StateTable states{{{rows, positions}, {}}, {{rows, velocities}, {}}};
-  StateSource source(model, range, seed);
-  VectorXd q(model.num_positions());
-  VectorXd xi(model.num_velocities());
-  for (long sample = 0; sample < count; ++sample) {
-    source.DrawPositions(&q);
-    source.DrawVelocity(&xi);
-    states.q.values.insert(states.q.values.end(), q.begin(), q.end());
-    states.v.values.insert(states.v.values.end(), xi.begin(), xi.end());
-  }
-  return states;
-}
-
 std::string WriteStateLines(const StateTable& states) {
   std::string lines;
   for (size_t sample = 0; sample < states.q.shape[0]; ++sample) {

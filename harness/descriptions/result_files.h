@@ -7,7 +7,6 @@
 #include <string>
 
 #include "harness/descriptions/program_layout.h"
-#include "harness/descriptions/random_states.h"
 #include "harness/log/npy_file.h"
 
 namespace dexcheck {
@@ -17,9 +16,6 @@ struct StateTable {
   NpyArray q;
   NpyArray v;
 };
-
-/// Random states, drawn as CheckConsistency draws them.
-StateTable DrawStates(const RobotDescription& robot, long count, const StateRange& range, std::uint64_t seed);
 
 /// A line {"id":0,"q":[...],"v":[...]} for each state.
 std::string WriteStateLines(const StateTable& states);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <set>
 
+#include "controller/common/linear_algebra.h"
 #include "controller/common/text.h"
 #include "controller/model/rigid_body.h"
 
@@ -20,28 +21,40 @@ const std::string& LinkOf(const RobotSpec& robot, int joint) {
   return joint < 0 ? robot.base.link : robot.joints[static_cast<size_t>(joint)].link;
 }
 
-MatrixXd CalcCouplingMap(const RobotSpec& robot) {
-  const std::vector<Joint>& joints = robot.joints;
-  std::vector<Eigen::Index> first(joints.size(), -1);  // column of each joint that follows none
-  Eigen::Index rows = 0, free = 0;
-  for (size_t i = 0; i < joints.size(); ++i) {
-    const int count = CountVelocities(joints[i].type);
-    rows += count;
-    if (joints[i].coupling) continue;
-    first[i] = free;
-    free += count;
+DescribedShape DescribeShape(ShapeKind kind, const Vector3d& half, const Pose& X_LS) {
+  const bool is_ball = kind == ShapeKind::kEllipsoid && half == Vector3d::Constant(half[0]);
+  const bool has_axis = kind == ShapeKind::kCapsule || kind == ShapeKind::kCylinder;
+  const Vector3d around = is_ball ? half : Vector3d(X_LS.linear().cwiseAbs() * half);
+  DescribedShape shape;
+  shape.low = X_LS.translation() - around;
+  shape.high = X_LS.translation() + around;
+  if (is_ball || has_axis) shape.radius = half[0];
+  if (has_axis) shape.axis = X_LS.linear().col(2);
+  if (kind == ShapeKind::kBox) shape.volume = 8.0 * half.prod();
+  if (kind == ShapeKind::kEllipsoid) shape.volume = 4.0 / 3.0 * kPi * half.prod();
+  if (kind == ShapeKind::kCylinder) shape.volume = 2.0 * kPi * half.prod();
+  // Its round ends have a third of a cylinder's volume less.
+  if (kind == ShapeKind::kCapsule) shape.volume = 2.0 * kPi * half[0] * half[0] * (half[2] - half[0] / 3.0);
+  return shape;
+}
+
+std::vector<int> ListFreeVelocities(const RobotModel& model) {
+  std::vector<int> free = ListIndices(model.num_velocities());
+  std::erase_if(free, [&](int i) {
+    const int dof = i - model.num_base_velocities();
+    return dof >= 0 && model.joint(model.joint_of_dof(dof)).coupling.has_value();
+  });
+  return free;
+}
+
+MatrixXd CalcCouplingMap(const RobotModel& model) {
+  MatrixXd T = MatrixXd::Identity(model.num_velocities(), model.num_velocities());
+  for (int i = 0; i < model.num_joints(); ++i) {
+    const std::optional<JointCoupling>& coupling = model.joint(i).coupling;
+    const int base = model.num_base_velocities();
+    if (coupling) T(base + model.dof(i), base + model.dof(coupling->leader)) = coupling->multiplier;
   }
-  MatrixXd T = MatrixXd::Zero(rows, free);
-  Eigen::Index row = 0;
-  for (size_t i = 0; i < joints.size(); ++i) {
-    const std::optional<JointCoupling>& coupling = joints[i].coupling;
-    if (coupling) {
-      T(row++, first[static_cast<size_t>(coupling->leader)]) = coupling->multiplier;
-    } else {
-      for (int k = 0; k < CountVelocities(joints[i].type); ++k) T(row++, first[i] + k) = 1.0;
-    }
-  }
-  return T;
+  return T(Eigen::all, ListFreeVelocities(model));
 }
 
 void FuseParts(RobotDescription* robot) {

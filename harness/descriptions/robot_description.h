@@ -46,6 +46,12 @@ struct DescribedShape {
   Vector3d axis = Vector3d::Zero();  ///< Unit axis of a cylinder or capsule; zero of a sphere.
 };
 
+/// How the volume of a shape follows from half its lengths: all round, with round ends, round about z, or not
+/// round. A mesh has none here.
+enum class ShapeKind { kEllipsoid, kCapsule, kCylinder, kBox, kMesh };
+/// @param half of its box along its own axes, m. @param X_LS the shape's frame in the link's.
+DescribedShape DescribeShape(ShapeKind kind, const Vector3d& half, const Pose& X_LS);
+
 /// A link as the file gives it, before what is welded together becomes one body.
 struct DescribedPart {
   std::string name;
@@ -101,9 +107,11 @@ void NoteImpossibleBodies(RobotDescription* robot);
 /// that state no inertial, or one without dynamics (a negative mass), do not count.
 void FuseParts(RobotDescription* robot);
 
-/// T with xi = T xi_free, size joints x (joints - coupled joints): the rates that the couplings leave free. T
-/// is constant, so T^T M T, T^T C T, T^T F are the terms of the coupled robot.
-MatrixXd CalcCouplingMap(const RobotSpec& robot);
+/// Entries of xi that no coupling determines.
+std::vector<int> ListFreeVelocities(const RobotModel& model);
+/// T with xi = T xi_free of these; it is constant, so T^T M T, T^T C T, T^T F are the terms of the coupled
+/// robot.
+MatrixXd CalcCouplingMap(const RobotModel& model);
 
 /// Lets a base that the file does not state float: its link's frame is Sigma_0.
 void LetBaseFloat(RobotDescription* robot);

@@ -237,33 +237,17 @@ DescribedShape UrdfFile::ReadShape(const Element& use) const {
   if (solid == nullptr) Fail(use.GetLineNum(), "geometry: missing");
   const std::string_view kind = solid->Name();
   const auto read = [&](const char* attribute) { return ReadNumber(*solid, "", attribute); };
-  DescribedShape shape;
-  Vector3d half = Vector3d::Zero();
-  if (kind == "sphere") {
-    const double r = read("radius");
-    half.setConstant(r);
-    shape.radius = r;
-    shape.volume = 4.0 / 3.0 * kPi * r * r * r;
-  } else if (kind == "box" && solid->Attribute("size") != nullptr) {
-    const Vector3d size = ReadVector(*solid, "", "size", half);
-    half = 0.5 * size;
-    shape.volume = size.x() * size.y() * size.z();
-  } else if (kind == "cylinder") {
-    const double length = read("length");
-    const double r = read("radius");
-    half << r, r, 0.5 * length;
-    shape.radius = r;
-    shape.axis = X_LS.linear().col(2);
-    shape.volume = kPi * r * r * length;
-  } else if (kind == "mesh" && solid->Attribute("filename") != nullptr) {
-    ReadVector(*solid, "", "scale", half);
-  } else {
-    Fail(solid->GetLineNum(), "geometry: must be a shape");
+  if (kind == "sphere") return DescribeShape(ShapeKind::kEllipsoid, Vector3d::Constant(read("radius")), X_LS);
+  if (kind == "box" && solid->Attribute("size") != nullptr)
+    return DescribeShape(ShapeKind::kBox, 0.5 * ReadVector(*solid, "", "size", Vector3d::Zero()), X_LS);
+  if (kind == "cylinder") {
+    const double half_length = 0.5 * read("length"), r = read("radius");
+    return DescribeShape(ShapeKind::kCylinder, {r, r, half_length}, X_LS);
   }
-  const Vector3d around = kind == "sphere" ? half : Vector3d(X_LS.linear().cwiseAbs() * half);
-  shape.low = X_LS.translation() - around;
-  shape.high = X_LS.translation() + around;
-  return shape;
+  if (kind != "mesh" || solid->Attribute("filename") == nullptr)
+    Fail(solid->GetLineNum(), "geometry: must be a shape");
+  ReadVector(*solid, "", "scale", Vector3d::Zero());
+  return DescribeShape(ShapeKind::kMesh, Vector3d::Zero(), X_LS);
 }
 
 std::vector<DescribedShape> UrdfFile::ReadShapes(const UrdfLink& link) const {

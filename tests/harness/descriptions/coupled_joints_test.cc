@@ -64,7 +64,7 @@ TEST(CoupledJoints, TablesSayThem) {
   EXPECT_EQ(joints[1].coupling->multiplier, -2.0);
   EXPECT_DOUBLE_EQ(joints[1].coupling->offset, -0.3);
   EXPECT_EQ(joints[2].coupling->multiplier, 2.0);
-  EXPECT_EQ(CalcCouplingMap(table.spec), Vector3d(1.0, -2.0, 2.0));
+  EXPECT_EQ(CalcCouplingMap(RobotModel(table.spec)), Vector3d(1.0, -2.0, 2.0));
 
   // Written and read again they are the same.
   const RobotDescription again = ReadGripper(WriteParameters(table, "gripper.toml"));

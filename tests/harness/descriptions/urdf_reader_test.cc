@@ -204,7 +204,7 @@ TEST(Urdf, ReadsAHandByHand) {
   // xi = T xi_free: the slide follows the knuckle.
   MatrixXd T(3, 2);
   T << 1.0, 0.0, -0.05, 0.0, 0.0, 1.0;
-  EXPECT_EQ(CalcCouplingMap(hand.spec), T);
+  EXPECT_EQ(CalcCouplingMap(RobotModel(hand.spec)), T);
 }
 
 TEST(Urdf, KeepsAnyNameInATable) {
