@@ -210,9 +210,7 @@ void CandidateSearch::SearchPart(const Part& part) {
     }
   }
   if (part.IsWrong(SiteKind::kCom)) {
-    const double bits = CountEntries(3, given.data(), right.com.data(), part.open.com.data());
-    const std::string values =
-        DescribeEntries(kAxisNames, given.data(), right.com.data(), part.open.com.data());
+    const auto [bits, values] = CompareEntries(kAxisNames, given, right.com, part.open.com);
     const auto take = [c = right.com, open = part.open.com](PrintedLink* made) {
       made->inertial->origin.t = c;
       made->inertial->origin.half_t = open;
@@ -239,7 +237,7 @@ void CandidateSearch::SearchInertiaNumbers(const Part& part) {
   const Vector6d open =
       ToEntries(R.isIdentity(1e-9) ? part.open.inertia
                                    : Matrix3d(R.transpose().cwiseAbs() * part.open.inertia * R.cwiseAbs()));
-  const std::string values = DescribeEntries(kInertiaNames, given6.data(), right6.data(), open.data());
+  const auto [bits_of_six, values] = CompareEntries(kInertiaNames, given6, right6, open);
   const auto offer = [&](Kind kind, double bits, const std::string& shown, int component = 0,
                          bool in_second = false) {
     EditTrial trial = part.Make({kind, SiteKind::kInertia, component}, bits, shown);
@@ -249,7 +247,7 @@ void CandidateSearch::SearchInertiaNumbers(const Part& part) {
       made->inertial->half_I = open;
     });
   };
-  offer(Kind::kNumber, CountEntries(6, given6.data(), right6.data(), open.data()), values);
+  offer(Kind::kNumber, bits_of_six, values);
   const auto solve = [](const Matrix3d& tensor) -> Vector3d {
     return Eigen::SelfAdjointEigenSolver<Matrix3d>(tensor).eigenvalues();
   };

@@ -90,15 +90,13 @@ bool CandidateSearch::Try(const EditTrial& trial, int place, const std::vector<P
         if ((trial.kinds & MaskOf(kind)) == 0 || !(IsOfBody(kind) ? tried.has_body : tried.is_placed))
           continue;
         const bool is_wrong = IsWrong(tried.link, kind);
-        const double was = pair_.CompareNode(kind, tried.link);
-        const double ratio = pair_.CompareNode(kind, tried.link, now);
+        double apart = 0.0, was_apart = 0.0;
+        const double was = pair_.CompareNode(kind, tried.link, given, &was_apart);
+        const double ratio = pair_.CompareNode(kind, tried.link, now, &apart);
         // An entry that is printed exactly, as a 0, must not hide that the others become no better.
-        const auto is_nearer = [&] {
-          return ratio <= 1.0 || pair_.CalcDeviation(kind, tried.link, now) <
-                                     kNearer * pair_.CalcDeviation(kind, tried.link, given);
-        };
+        const bool is_nearer = ratio <= 1.0 || apart < kNearer * was_apart;
         const bool holds = is_close
-                               ? (is_wrong ? CountLeft(ratio, was).has_value() && is_nearer() : ratio <= 1.0)
+                               ? (is_wrong ? CountLeft(ratio, was).has_value() && is_nearer : ratio <= 1.0)
                                : ratio < kFar || ratio < 0.05 * was;
         if (!holds && (!is_wrong || trial.needs_all)) return false;
         if (!is_close || !is_wrong || !holds) continue;
@@ -240,26 +238,22 @@ std::string DescribeRight(const Vector3d& given, const Vector3d& right) {
   return DescribeRight("(" + ShowVector(given) + ")", "(" + ShowVector(right) + ")");
 }
 
-std::string DescribeEntries(std::span<const char* const> names, const double* given, const double* right,
-                            const double* open) {
-  std::string text;
-  for (const size_t k : ListDiffering(names.size(), given, right, open))
-    text += fmt::format("{}{} {}", text.empty() ? "" : "; ", names[k],
-                        DescribeRight(given[k], ShowZero(right[k], open[k])));
-  return text;
+EntryDifference CompareEntries(std::span<const char* const> names, const double* given, const double* right,
+                               const double* open) {
+  EntryDifference difference;
+  for (const size_t k : ListDiffering(names.size(), given, right, open)) {
+    const double shown = ShowZero(right[k], open[k]);
+    difference.bits += CountBits(shown, open[k]);
+    difference.values += fmt::format("{}{} {}", difference.values.empty() ? "" : "; ", names[k],
+                                     DescribeRight(given[k], shown));
+  }
+  return difference;
 }
 
 std::string ShowVector(const Vector3d& v) {
   constexpr double kRounding = 1e-9;
   const auto show = [&](double x) { return ShowZero(x, kRounding * v.norm()); };
   return fmt::format("{:.6g} {:.6g} {:.6g}", show(v[0]), show(v[1]), show(v[2]));
-}
-
-double CountEntries(size_t count, const double* given, const double* right, const double* open) {
-  double bits = 1.0;
-  for (const size_t k : ListDiffering(count, given, right, open))
-    bits += CountBits(ShowZero(right[k], open[k]), open[k]);
-  return bits;
 }
 
 }  // namespace dexcheck

@@ -117,15 +117,21 @@ std::optional<double> CountLeft(double after, double before);
 std::string DescribeRight(const std::string& given, const std::string& right);
 std::string DescribeRight(double given, double right);
 std::string DescribeRight(const Vector3d& given, const Vector3d& right);
-/// "x 0.1 here, 0.2 in the other file" of each entry that differs by more than the tolerance.
-std::string DescribeEntries(std::span<const char* const> names, const double* given, const double* right,
-                            const double* open);
+/// The bits of the entries that differ by more than the tolerance, and "x 0.1 here, 0.2 in the other file" of
+/// each.
+struct EntryDifference {
+  double bits = 1.0;
+  std::string values{};
+};
+EntryDifference CompareEntries(std::span<const char* const> names, const double* given, const double* right,
+                               const double* open);
+template <typename Vector>
+EntryDifference CompareEntries(std::span<const char* const> names, const Vector& given, const Vector& right,
+                               const Vector& open) {
+  return CompareEntries(names, given.data(), right.data(), open.data());
+}
 /// "0.1 0 -0.2": entries that are rounding beside the largest are 0.
 std::string ShowVector(const Vector3d& v);
-/// The bits of these entries.
-double CountEntries(size_t count, const double* given, const double* right, const double* open);
-inline constexpr const char* kAxisNames[] = {"x", "y", "z"};
-inline constexpr const char* kAngleNames[] = {"roll", "pitch", "yaw"};
 inline constexpr const char* kInertiaNames[] = {"ixx", "iyy", "izz", "ixy", "ixz", "iyz"};
 
 /// The rotation of an inertial's frame, which the other file turns and this one does not.

@@ -50,8 +50,6 @@ constexpr UnitFault kArmatures[] = {{1e-6, "kg_mm2", "in kg mm^2"},
 constexpr UnitFault kSignOnly[] = {{-1.0, "sign", "with the other sign"}};
 constexpr UnitFault kGravities[] = {{1e-3, "mm", "in mm/s^2"}};
 
-constexpr const char* kAxes[] = {"x", "y", "z"};
-constexpr const char* kAngles[] = {"roll", "pitch", "yaw"};
 constexpr const char* kProducts[] = {"ixy", "ixz", "iyz"};
 constexpr const char* kRowNumbers[] = {"alpha", "a", "q", "d"};
 constexpr const char* kPermuted[] = {"with x and y exchanged", "with x and z exchanged",
@@ -181,15 +179,15 @@ std::string NameComponent(const FileFault& fault, bool is_id) {
       return kSequences[at];
     case Kind::kAngleSign:
     case Kind::kAngleDegrees:
-      return kAngles[at];
+      return kAngleNames[at];
     case Kind::kProductSign:
       return kProducts[at];
     case Kind::kTurnOwn:
     case Kind::kTurnParent: {
       constexpr const char* kTurns[] = {"-90 degrees", "180 degrees", "90 degrees"};
       constexpr const char* kIds[] = {"quarter_back", "half", "quarter"};
-      return is_id ? fmt::format("{}_{}", kIds[at % 3], kAxes[at / 3])
-                   : fmt::format("{} about {}", kTurns[at % 3], kAxes[at / 3]);
+      return is_id ? fmt::format("{}_{}", kIds[at % 3], kAxisNames[at / 3])
+                   : fmt::format("{} about {}", kTurns[at % 3], kAxisNames[at / 3]);
     }
     case Kind::kClassicRows:
       if (is_id) return at == 0 ? "classic" : "modified";
@@ -199,9 +197,9 @@ std::string NameComponent(const FileFault& fault, bool is_id) {
       return is_id ? (at == 0 ? "shifted_down" : "shifted_up") : at == 0 ? "before" : "behind";
     case Kind::kSignOf:
       if (fault.of == SiteKind::kPosition && fault.whole) return kRowNumbers[at];
-      return kAxes[at % 3];
+      return kAxisNames[at % 3];
     default:
-      return kAxes[at % 3];
+      return kAxisNames[at % 3];
   }
 }
 

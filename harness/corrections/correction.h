@@ -187,6 +187,8 @@ const char* NameSite(SiteKind kind);
 /// Names the place of a quantity of a link: "link l1", "joint q1", or "frame tip".
 std::string NamePlace(const PrintedLink& link, SiteKind kind);
 
+inline constexpr const char* kAxisNames[] = {"x", "y", "z"};
+inline constexpr const char* kAngleNames[] = {"roll", "pitch", "yaw"};
 inline constexpr int kPermutations[5][3] = {{1, 0, 2}, {2, 1, 0}, {0, 2, 1}, {1, 2, 0}, {2, 0, 1}};
 inline constexpr int kSixOrders[5][6] = {
     {0, 3, 5, 1, 2, 4}, {0, 2, 5, 1, 3, 4}, {0, 1, 2, 5, 4, 3}, {0, 1, 2, 3, 5, 4}, {0, 1, 2, 4, 3, 5}};

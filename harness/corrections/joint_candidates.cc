@@ -84,7 +84,8 @@ void CandidateSearch::SearchRange(int link) {
   const double given[] = {lower.value, upper.value};
   const double right[] = {right_lower.value, right_upper.value};
   const double open[] = {lower.half + right_lower.half + 1e-9, upper.half + right_upper.half + 1e-9};
-  add(Kind::kNumber, CountEntries(2, given, right, open), DescribeEntries(kNames, given, right, open));
+  const auto [bits, values] = CompareEntries(kNames, given, right, open);
+  add(Kind::kNumber, bits, values);
 }
 
 void CandidateSearch::SearchMimic(int link) {
@@ -265,12 +266,12 @@ void CandidateSearch::SearchRobot() {
       const Vector3d& right = *b.gravity;
       const Vector3d open = Vector3d::Constant(1e-6);
       const double size = right.norm();
-      const std::string values = DescribeEntries(kAxisNames, given.data(), right.data(), open.data());
+      const auto [bits, values] = CompareEntries(kAxisNames, given, right, open);
       if ((given + right).norm() <= 1e-6 * size) add(Kind::kSign, 0.0, values);
       if (given.isZero()) add(Kind::kMissing, 0.0, values);
       if ((1e-3 * given - right).norm() <= 1e-6 * size) add(Kind::kUnit, 0.0, values);
       if (std::abs(given.norm() - size) <= 1e-6 * size) add(Kind::kOtherAxis, 3.0, values);
-      add(Kind::kNumber, CountEntries(3, given.data(), right.data(), open.data()), values);
+      add(Kind::kNumber, bits, values);
     }
   }
 }

@@ -114,10 +114,9 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
   if (!is_row && CalcAngle(right) <= origin.open_angle)
     offer(CorrectionKind::kSurplus, TurnsQuarters(given) ? 5.0 : 8.0, "");
   if (!is_row && given.isIdentity(1e-12)) {
-    const Vector3d none = Vector3d::Zero(), angles = SolveRollPitchYaw(right)[0];
-    const Vector3d open = Vector3d::Constant(half);
-    const double bits = 4.0 + 0.35 * CountEntries(3, none.data(), angles.data(), open.data());
-    offer(CorrectionKind::kMissing, TurnsQuarters(right) ? 3.5 : bits,
+    const Vector3d none = Vector3d::Zero(), open = Vector3d::Constant(half);
+    const double bits = CompareEntries(kAngleNames, none, SolveRollPitchYaw(right)[0], open).bits;
+    offer(CorrectionKind::kMissing, TurnsQuarters(right) ? 3.5 : 4.0 + 0.35 * bits,
           ShowAngles(right) + " in the other file");
   }
   const PrintedJoint& joint = pair_.a().link(origin.node).joint;
@@ -154,9 +153,8 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
     for (const Vector3d& angles : SolveRollPitchYaw(right)) {
       if (is_one_angle) break;
       const Vector3d near = (angles - r).unaryExpr([](double d) { return std::remainder(d, 2.0 * kPi); }) + r;
-      const Vector3d open = Vector3d::Constant(half);
-      offer(CorrectionKind::kNumber, 1.0 + CountEntries(3, r.data(), near.data(), open.data()),
-            DescribeEntries(kAngleNames, r.data(), near.data(), open.data()));
+      const auto [bits, values] = CompareEntries(kAngleNames, r, near, Vector3d(Vector3d::Constant(half)));
+      offer(CorrectionKind::kNumber, 1.0 + bits, values);
     }
   }
   if (is_one_angle) return;
@@ -177,8 +175,7 @@ void CandidateSearch::SearchPositionNumbers(const Origin& origin) {
   const Vector3d& t = origin.given.t;
   const Vector3d right = origin.right.translation();
   const Vector3d open = origin.open_length;
-  const double bits = CountEntries(3, t.data(), right.data(), open.data());
-  const std::string values = DescribeEntries(kAxisNames, t.data(), right.data(), open.data());
+  const auto [bits, values] = CompareEntries(kAxisNames, t, right, open);
   const auto take = [right](PrintedLink* link) { link->origin.t = right; };
   const PrintedJoint& joint = pair_.a().link(origin.node).joint;
   const auto [ref, refs] = CompareReferences(origin);
@@ -220,10 +217,9 @@ void CandidateSearch::SearchRowNumbers(const Origin& origin) {
   const auto show = [](const Vector4d& numbers) -> Vector4d {
     return numbers.cwiseProduct(Vector4d(RadToDeg(1.0), 1.0, RadToDeg(1.0), 1.0));
   };
-  Try(origin.Make(CorrectionKind::kNumber, SiteKind::kPosition,
-                  CountEntries(4, given.data(), right.data(), open.data()),
-                  DescribeEntries(kNames, show(given).data(), show(right).data(), show(open).data()), true),
-      origin.link, [row](PrintedLink* link) { link->origin = row; });
+  const auto [bits, values] = CompareEntries(kNames, show(given), show(right), show(open));
+  Try(origin.Make(CorrectionKind::kNumber, SiteKind::kPosition, bits, values, true), origin.link,
+      [row](PrintedLink* link) { link->origin = row; });
 }
 
 /// One convention of all origins that lead to parts of a link and to the joints on it.
@@ -288,12 +284,12 @@ void CandidateSearch::SearchWeld(int link) {
   const Vector3d t = right.com - origin.CalcRotation() * given.com;
   const Vector3d open =
       Vector3d::Constant(pair_.given(home).body_tolerance.com.norm() * whole.mass / alone->mass + 1e-6);
-  const double bits = CountEntries(3, origin.t.data(), t.data(), open.data());
+  const auto [bits, values] = CompareEntries(kAxisNames, origin.t, t, open);
   const bool is_missing = origin.t.isZero();
   Try({{is_missing ? CorrectionKind::kMissing : CorrectionKind::kNumber, SiteKind::kPosition},
        is_missing ? 3.0 + 0.25 * bits : bits,
        kPoseMask | kBodyMask,
-       DescribeEntries(kAxisNames, origin.t.data(), t.data(), open.data())},
+       values},
       link, [t, open](PrintedLink* part) {
         part->origin.t = t;
         part->origin.half_t = open;

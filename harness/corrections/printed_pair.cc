@@ -150,38 +150,31 @@ void PrintedPair::SetRight(int link) {
   right.body_tolerance.inertia.array() += 2.0 * open.angle * std::abs(theirs.body.inertia.trace());
 }
 
-double PrintedPair::CalcDeviation(SiteKind kind, int link, const GivenNode& now) const {
-  const RightNode& right = right_[static_cast<size_t>(link)];
-  switch (kind) {
-    case SiteKind::kPosition:
-      return (now.X.translation() - right.X.translation()).norm();
-    case SiteKind::kRotation:
-      return CalcAngle(now.X.linear().transpose() * right.X.linear());
-    case SiteKind::kMass:
-      return std::abs(now.body.mass - right.body.mass);
-    case SiteKind::kCom:
-      return (now.body.com - right.body.com).norm();
-    case SiteKind::kInertia:
-      return (now.body.inertia - right.body.inertia).norm();
-    default:
-      return 0.0;
-  }
-}
-
-double PrintedPair::CompareNode(SiteKind kind, int link, const GivenNode& now) const {
+double PrintedPair::CompareNode(SiteKind kind, int link, const GivenNode& now, double* deviation) const {
   const RightNode& right = right_[static_cast<size_t>(link)];
   const MassProperties &body = now.body, &tolerance = now.body_tolerance;
+  const auto keep = [&](double distance) {
+    if (deviation != nullptr) *deviation = distance;
+    return distance;
+  };
+  const auto compare = [&](const Vector3d& apart, const Vector3d& open) {
+    keep(apart.norm());
+    return CompareVectors(apart, open);
+  };
   switch (kind) {
     case SiteKind::kPosition:
-      return CompareVectors(now.X.translation() - right.X.translation(), now.pose.length + right.pose.length);
+      return compare(now.X.translation() - right.X.translation(), now.pose.length + right.pose.length);
     case SiteKind::kRotation:
-      return CalcAngle(now.X.linear().transpose() * right.X.linear()) / (now.pose.angle + right.pose.angle);
+      return keep(CalcAngle(now.X.linear().transpose() * right.X.linear())) /
+             (now.pose.angle + right.pose.angle);
     case SiteKind::kMass:
-      return std::abs(body.mass - right.body.mass) / (tolerance.mass + right.body_tolerance.mass + 1e-15);
+      return keep(std::abs(body.mass - right.body.mass)) /
+             (tolerance.mass + right.body_tolerance.mass + 1e-15);
     case SiteKind::kCom:
-      return CompareVectors(body.com - right.body.com, tolerance.com + right.body_tolerance.com);
+      return compare(body.com - right.body.com, tolerance.com + right.body_tolerance.com);
     case SiteKind::kInertia: {
-      const auto compare = [&](double scale) {
+      keep((body.inertia - right.body.inertia).norm());
+      const auto scaled = [&](double scale) {
         return ((scale * body.inertia - right.body.inertia).cwiseAbs().array() /
                 (tolerance.inertia + right.body_tolerance.inertia).array())
             .maxCoeff();
@@ -189,10 +182,10 @@ double PrintedPair::CompareNode(SiteKind kind, int link, const GivenNode& now) c
       // A mass within its digits' tolerance may have been another one when the inertia was computed from it.
       const bool is_open = body.mass > 0.0 && std::abs(body.mass - right.body.mass) <=
                                                   tolerance.mass + right.body_tolerance.mass;
-      return is_open ? std::min(compare(1.0), compare(right.body.mass / body.mass)) : compare(1.0);
+      return is_open ? std::min(scaled(1.0), scaled(right.body.mass / body.mass)) : scaled(1.0);
     }
     default:
-      return 0.0;
+      return keep(0.0);
   }
 }
 

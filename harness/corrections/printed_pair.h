@@ -62,9 +62,9 @@ class PrintedPair {
   [[nodiscard]] const GivenNode& other(int link) const { return other_[static_cast<size_t>(link)]; }
 
   /// How far a number is from right, relative to its digits' tolerance; at most 1: it is right.
-  [[nodiscard]] double CompareNode(SiteKind kind, int link, const GivenNode& now) const;
-  /// Its distance from the right one, m, rad, kg or kg m^2, whatever the digits.
-  [[nodiscard]] double CalcDeviation(SiteKind kind, int link, const GivenNode& now) const;
+  /// @param deviation gets its distance from the right one, m, rad, kg or kg m^2, whatever the digits.
+  [[nodiscard]] double CompareNode(SiteKind kind, int link, const GivenNode& now,
+                                   double* deviation = nullptr) const;
   /// Compares the numbers as they were measured.
   [[nodiscard]] double CompareNode(SiteKind kind, int link) const {
     return CompareNode(kind, link, given(link));

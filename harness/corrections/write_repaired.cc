@@ -98,10 +98,21 @@ void SetAttribute(XmlElement* element, std::string_view path, const std::string&
   element->SetAttribute(std::string(path).c_str(), text.c_str());
 }
 
-class UrdfRepair final : private RepairWriter {
+/// A file whose joints are elements.
+class XmlRepair : protected RepairWriter {
+ protected:
+  using RepairWriter::RepairWriter;
+  ~XmlRepair() = default;
+  void SetOfJoint(const PrintedLink& /*link*/, const std::string& path, const std::string& value) override {
+    SetAttribute(element_, path, value);
+  }
+  XmlElement* element_ = nullptr;  // of the joint that is written
+};
+
+class UrdfRepair final : private XmlRepair {
  public:
   UrdfRepair(const DescriptionFile& file, const PrintedRobot& before, const PrintedRobot& after)
-      : RepairWriter(file, kUrdfKeys, before, after), urdf_(file.text(), file.path().string()) {}
+      : XmlRepair(file, kUrdfKeys, before, after), urdf_(file.text(), file.path().string()) {}
 
   std::string Write() {
     for (const UrdfLink& link : urdf_.links()) {
@@ -118,9 +129,6 @@ class UrdfRepair final : private RepairWriter {
   }
 
  private:
-  void SetOfJoint(const PrintedLink& /*link*/, const std::string& path, const std::string& value) override {
-    SetAttribute(element_, path, value);
-  }
   void WriteRange(const PrintedLink& /*link*/, double lower, double upper) override {
     SetAttribute(element_, "limit/lower", Format(lower));
     SetAttribute(element_, "limit/upper", Format(upper));
@@ -153,13 +161,12 @@ class UrdfRepair final : private RepairWriter {
   }
 
   UrdfFile urdf_;
-  XmlElement* element_ = nullptr;  // of the joint that is written
 };
 
-class MjcfRepair final : private RepairWriter {
+class MjcfRepair final : private XmlRepair {
  public:
   MjcfRepair(const DescriptionFile& file, const PrintedRobot& before, const PrintedRobot& after)
-      : RepairWriter(file, kMjcfKeys, before, after), mjcf_(file.path(), &file.text()) {
+      : XmlRepair(file, kMjcfKeys, before, after), mjcf_(file.path(), &file.text()) {
     for (const XmlElement* compiler : ListChildren(mjcf_.root(), "compiler")) {
       if (compiler->Attribute("angle") != nullptr)
         in_degrees_ = ReadAttribute(*compiler, "angle") != "radian";
@@ -177,9 +184,6 @@ class MjcfRepair final : private RepairWriter {
   }
 
  private:
-  void SetOfJoint(const PrintedLink& /*link*/, const std::string& path, const std::string& value) override {
-    SetAttribute(element_, path, value);
-  }
   void WriteRange(const PrintedLink& link, double lower, double upper) override {
     const double unit = link.joint.kind == JointKind::kHinge && in_degrees_ ? RadToDeg(1.0) : 1.0;
     SetAttribute(element_, "range", JoinVector(Vector2d(lower * unit, upper * unit)));
@@ -242,7 +246,6 @@ class MjcfRepair final : private RepairWriter {
   MjcfFile mjcf_;  // with the words that this engine does not know
   bool in_degrees_ = true;
   int link_ = 0;
-  XmlElement* element_ = nullptr;  // of the joint that is written
 };
 
 }  // namespace
