@@ -144,6 +144,16 @@ class TomlTable {
   TomlValue Get(std::string_view key);
   /// The value under a key that may be missing.
   std::optional<TomlValue> Find(std::string_view key);
+  /// What a function of TomlValue makes of it.
+  template <typename T>
+  std::optional<T> Find(std::string_view key, T (TomlValue::*as)() const) {
+    const std::optional<TomlValue> value = Find(key);
+    return value ? std::optional<T>(((*value).*as)()) : std::nullopt;
+  }
+  /// The entries of the list under a key; none when it is missing.
+  std::vector<TomlValue> FindList(std::string_view key) {
+    return Find(key, &TomlValue::AsList).value_or(std::vector<TomlValue>());
+  }
   /// All keys and values in the file's order, for a table whose keys are names of the user's choice.
   std::vector<std::pair<std::string, TomlValue>> GetEntries();
 

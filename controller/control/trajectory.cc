@@ -134,11 +134,8 @@ DesiredMotion EvaluateKnots(const std::vector<Knot>& knots, double t) {
   return motion;
 }
 
-enum class Type { kLine, kPointToPoint, kOscillation, kWeave, kCircle, kWayPoints, kSum };
-
 double ReadRampTime(TomlTable& table) {
-  const auto value = table.Find("ramp_time");
-  return value ? value->AsNotNegative() : 0.0;
+  return table.Find("ramp_time", &TomlValue::AsNotNegative).value_or(0.0);
 }
 
 double ReadHeading(TomlTable& table) {
@@ -215,42 +212,38 @@ PlanarPath ReadPath(TomlTable& table) {
 }
 
 TrajectoryMaker ReadByType(TomlTable& table) {
-  const Type type = table.Get("type").AsChoice<Type>({{"line", Type::kLine},
-                                                      {"point_to_point", Type::kPointToPoint},
-                                                      {"oscillation", Type::kOscillation},
-                                                      {"weave", Type::kWeave},
-                                                      {"circle", Type::kCircle},
-                                                      {"way_points", Type::kWayPoints},
-                                                      {"sum", Type::kSum}});
-  switch (type) {
-    case Type::kLine: {
-      const Vector6d velocity = ReadCoordinates(table, "velocity", "turning");
-      return MakerOf(MakeLineTrajectory, velocity, ReadRampTime(table));
-    }
-    case Type::kPointToPoint: {
-      const Vector6d displacement = ReadCoordinates(table, "xyz", "zyz");
-      return MakerOf(MakePointToPointTrajectory, displacement, table.Get("duration").AsPositive());
-    }
-    case Type::kOscillation: {
-      const Vector6d amplitude = ReadCoordinates(table, "xyz", "zyz");
-      const double frequency = ReadFrequency(table);
-      return MakerOf(MakeOscillationTrajectory, amplitude, frequency, ReadRampTime(table), 0.0);
-    }
-    case Type::kWeave: {
-      const Wave wave = ReadWave(table);
-      return MakerOf(MakeWeaveTrajectory, ReadPath(table), wave.amplitude, wave.wavelength);
-    }
-    case Type::kCircle: {
-      const TomlValue radius = table.Get("radius");
-      if (radius.AsNumber() == 0.0) radius.Fail("must not be zero");
-      return MakerOf(MakeCircleTrajectory, ReadPath(table), radius.AsNumber());
-    }
-    case Type::kWayPoints:
-      return MakerOf(MakeWayPointTrajectory, ReadWayPoints(table));
-    case Type::kSum:
-      return MakerOf(MakeSum, ReadParts(table));
-  }
-  return nullptr;
+  using Read = TrajectoryMaker (*)(TomlTable&);
+  const auto read = table.Get("type").AsChoice<Read>(
+      {{"line",
+        [](TomlTable& t) {
+          const Vector6d velocity = ReadCoordinates(t, "velocity", "turning");
+          return MakerOf(MakeLineTrajectory, velocity, ReadRampTime(t));
+        }},
+       {"point_to_point",
+        [](TomlTable& t) {
+          const Vector6d displacement = ReadCoordinates(t, "xyz", "zyz");
+          return MakerOf(MakePointToPointTrajectory, displacement, t.Get("duration").AsPositive());
+        }},
+       {"oscillation",
+        [](TomlTable& t) {
+          const Vector6d amplitude = ReadCoordinates(t, "xyz", "zyz");
+          const double frequency = ReadFrequency(t);
+          return MakerOf(MakeOscillationTrajectory, amplitude, frequency, ReadRampTime(t), 0.0);
+        }},
+       {"weave",
+        [](TomlTable& t) {
+          const Wave wave = ReadWave(t);
+          return MakerOf(MakeWeaveTrajectory, ReadPath(t), wave.amplitude, wave.wavelength);
+        }},
+       {"circle",
+        [](TomlTable& t) {
+          const TomlValue radius = t.Get("radius");
+          if (radius.AsNumber() == 0.0) radius.Fail("must not be zero");
+          return MakerOf(MakeCircleTrajectory, ReadPath(t), radius.AsNumber());
+        }},
+       {"way_points", [](TomlTable& t) { return MakerOf(MakeWayPointTrajectory, ReadWayPoints(t)); }},
+       {"sum", [](TomlTable& t) { return MakerOf(MakeSum, ReadParts(t)); }}});
+  return read(table);
 }
 
 }  // namespace

@@ -10,51 +10,38 @@ namespace dexcheck {
 
 namespace {
 
-Matrix3d Diagonal(double Ixx, double Iyy, double Izz) { return Vector3d(Ixx, Iyy, Izz).asDiagonal(); }
+// Squares of the coordinates of a uniform solid's points along x, y and z, their mean, m^2: per mass,
+// I_x = s_y + s_z and cyclic.
 
-Matrix3d CalcInertia(const SolidSphere& sphere, double m) {
-  // I = 2/5 m r^2
-  return Matrix3d::Identity() * (0.4 * m * sphere.radius * sphere.radius);
+Vector3d CalcMeanSquares(const SolidEllipsoid& ellipsoid) {
+  return ellipsoid.semi_axes.array().square() / 5.0;
 }
 
-Matrix3d CalcInertia(const SolidCylinder& cylinder, double m) {
-  // I_x = m (r^2 / 4 + l^2 / 12),  I_z = m r^2 / 2
-  const double r = cylinder.radius;
-  const double l = cylinder.length;
-  const double Ix = m * (r * r / 4.0 + l * l / 12.0);
-  return Diagonal(Ix, Ix, m * r * r / 2.0);
+Vector3d CalcMeanSquares(const SolidSphere& sphere) {
+  return Vector3d::Constant(sphere.radius * sphere.radius / 5.0);
 }
 
-Matrix3d CalcInertia(const SolidCapsule& capsule, double m) {
-  // A cylinder and two half spheres share the mass as l : 4/3 r. Each half sphere, of mass m_s / 2, has its
-  // centre of mass 3/8 r beyond the cylinder's end, so by the parallel-axis theorem
-  //   I_x = m_c (r^2 / 4 + l^2 / 12) + m_s (2/5 r^2 + l^2 / 4 + 3/8 l r),  I_z = m_c r^2 / 2 + m_s 2/5 r^2
+Vector3d CalcMeanSquares(const SolidBox& box) { return box.size.array().square() / 12.0; }
+
+Vector3d CalcMeanSquares(const SolidCylinder& cylinder) {
+  const double r2 = cylinder.radius * cylinder.radius;
+  return {r2 / 4.0, r2 / 4.0, cylinder.length * cylinder.length / 12.0};
+}
+
+Vector3d CalcMeanSquares(const SolidCapsule& capsule) {
+  // A cylinder and two half spheres share the mass as l : 4/3 r. Each half sphere has its centre of mass
+  // 3/8 r beyond the cylinder's end.
   const double r = capsule.radius;
   const double l = capsule.length;
-  const double m_c = m * l / (l + 4.0 / 3.0 * r);
-  const double m_s = m - m_c;
-  const double Ix = m_c * (r * r / 4.0 + l * l / 12.0) + m_s * (0.4 * r * r + l * l / 4.0 + 0.375 * l * r);
-  return Diagonal(Ix, Ix, (0.5 * m_c + 0.4 * m_s) * r * r);
+  const double part = l / (l + 4.0 / 3.0 * r);
+  const Vector3d ends(r * r / 5.0, r * r / 5.0, r * r / 5.0 + l * l / 4.0 + 0.375 * l * r);
+  return part * CalcMeanSquares(SolidCylinder{r, l}) + (1.0 - part) * ends;
 }
 
-Matrix3d CalcInertia(const SolidBox& box, double m) {
-  // I_x = m (s_y^2 + s_z^2) / 12 and cyclic
-  const Vector3d s2 = box.size.array().square();
-  return Diagonal(s2.y() + s2.z(), s2.z() + s2.x(), s2.x() + s2.y()) * (m / 12.0);
-}
-
-Matrix3d CalcInertia(const SolidTorus& torus, double m) {
-  // I_x = m (R^2 / 2 + 5/8 r^2),  I_z = m (R^2 + 3/4 r^2)
-  const double R = torus.ring_radius;
-  const double r = torus.tube_radius;
-  const double Ix = m * (0.5 * R * R + 0.625 * r * r);
-  return Diagonal(Ix, Ix, m * (R * R + 0.75 * r * r));
-}
-
-Matrix3d CalcInertia(const SolidEllipsoid& ellipsoid, double m) {
-  // I_x = m (b^2 + c^2) / 5 and cyclic
-  const Vector3d a2 = ellipsoid.semi_axes.array().square();
-  return Diagonal(a2.y() + a2.z(), a2.z() + a2.x(), a2.x() + a2.y()) * (m / 5.0);
+Vector3d CalcMeanSquares(const SolidTorus& torus) {
+  const double R2 = torus.ring_radius * torus.ring_radius;
+  const double r2 = torus.tube_radius * torus.tube_radius;
+  return {0.5 * R2 + 0.375 * r2, 0.5 * R2 + 0.375 * r2, 0.25 * r2};
 }
 
 /// Rods and plates meet the inequalities with equality. Their entries, rounded when written down, rotated and
@@ -87,7 +74,8 @@ Matrix3d TurnRollPitchYaw(const Vector3d& angles) {
 }
 
 Matrix3d CalcUniformInertia(const Shape& shape, double mass) {
-  return std::visit([mass](const auto& solid) { return CalcInertia(solid, mass); }, shape);
+  const Vector3d s = std::visit([](const auto& solid) { return CalcMeanSquares(solid); }, shape);
+  return (mass * Vector3d(s.y() + s.z(), s.z() + s.x(), s.x() + s.y())).asDiagonal();
 }
 
 MassProperties CalcMassProperties(const Shape& shape, double mass, const Pose& X_BS) {

@@ -9,13 +9,19 @@ namespace {
 // Axes are unit vectors to about the digits that people write: 0.7071.
 constexpr double kUnitVectorAllowance = 1e-4;
 
+template <typename Entry>
+std::vector<Entry> ReadList(const std::vector<TomlValue>& values, Entry (*read)(const TomlValue&)) {
+  std::vector<Entry> entries;
+  for (const TomlValue& value : values) entries.push_back(read(value));
+  return entries;
+}
+
 Matrix3d ReadRotation(TomlTable& table) {
   return TurnRollPitchYaw(table.FindAngles<3>("rpy").value_or(Vector3d::Zero()));
 }
 
 Vector3d ReadPoint(TomlTable& table, std::string_view key) {
-  const std::optional<TomlValue> point = table.Find(key);
-  return point ? point->AsVector<3>() : Vector3d::Zero();
+  return table.Find(key, &TomlValue::AsVector<3>).value_or(Vector3d::Zero());
 }
 
 /// Pose of a link's shape: `center`, and `axis` for a body of revolution or `rpy`.
@@ -49,35 +55,19 @@ void CheckLink(const TomlValue& value, const MassProperties& body) {
 MassProperties ReadPart(const TomlValue& value) {
   TomlTable table = value.AsTable();
   const Pose X_LB = ReadPose(table);
-  const std::optional<TomlValue> com = table.Find("com");
+  const Vector3d com = ReadPoint(table, "com");
   const TomlValue inertia = table.Get("inertia");
-  const MassProperties body{table.Get("mass").AsNotNegative(),
-                            com ? com->AsVector<3>() : Vector3d(Vector3d::Zero()), ReadInertia(inertia)};
+  const MassProperties body{table.Get("mass").AsNotNegative(), com, ReadInertia(inertia)};
   CheckLink(inertia, body);
   table.RejectUnused();
   return ExpressIn(body, X_LB);
 }
 
-SolidTorus ReadTorus(TomlTable& table) {
-  const SolidTorus torus{table.Get("ring_radius").AsPositive(), table.Get("tube_radius").AsPositive()};
-  if (torus.tube_radius >= torus.ring_radius) {
-    table.Get("tube_radius").Fail("must be less than ring_radius");
-  }
-  return torus;
-}
-
-SolidBox ReadBox(TomlTable& table) {
-  const TomlValue size = table.Get("size");
-  SolidBox box{size.AsVector<3>()};
-  if (box.size.minCoeff() <= 0.0) size.Fail("must be positive");
-  return box;
-}
-
-SolidEllipsoid ReadEllipsoid(TomlTable& table) {
-  const TomlValue axes = table.Get("semi_axes");
-  SolidEllipsoid ellipsoid{axes.AsVector<3>()};
-  if (ellipsoid.semi_axes.minCoeff() <= 0.0) axes.Fail("must be positive");
-  return ellipsoid;
+Vector3d ReadLengths(TomlTable& table, const char* key) {
+  const TomlValue lengths = table.Get(key);
+  const Vector3d values = lengths.AsVector<3>();
+  if (values.minCoeff() <= 0.0) lengths.Fail("must be positive");
+  return values;
 }
 
 }  // namespace
@@ -106,27 +96,24 @@ Pose ReadPose(const TomlValue& value) {
 }
 
 Shape ReadShape(TomlTable& table) {
-  enum class Kind { kSphere, kCylinder, kCapsule, kBox, kTorus, kEllipsoid };
-  switch (table.Get("shape").AsChoice<Kind>({{"sphere", Kind::kSphere},
-                                             {"cylinder", Kind::kCylinder},
-                                             {"capsule", Kind::kCapsule},
-                                             {"box", Kind::kBox},
-                                             {"torus", Kind::kTorus},
-                                             {"ellipsoid", Kind::kEllipsoid}})) {
-    case Kind::kCylinder:
-      return SolidCylinder{table.Get("radius").AsPositive(), table.Get("length").AsPositive()};
-    case Kind::kCapsule:
-      return SolidCapsule{table.Get("radius").AsPositive(), table.Get("length").AsPositive()};
-    case Kind::kBox:
-      return ReadBox(table);
-    case Kind::kTorus:
-      return ReadTorus(table);
-    case Kind::kEllipsoid:
-      return ReadEllipsoid(table);
-    case Kind::kSphere:
-      break;
+  const std::string kind = table.Get("shape").AsChoice<std::string>({{"sphere", "sphere"},
+                                                                     {"cylinder", "cylinder"},
+                                                                     {"capsule", "capsule"},
+                                                                     {"box", "box"},
+                                                                     {"torus", "torus"},
+                                                                     {"ellipsoid", "ellipsoid"}});
+  if (kind == "box") return SolidBox{ReadLengths(table, "size")};
+  if (kind == "ellipsoid") return SolidEllipsoid{ReadLengths(table, "semi_axes")};
+  if (kind == "torus") {
+    const SolidTorus torus{table.Get("ring_radius").AsPositive(), table.Get("tube_radius").AsPositive()};
+    if (torus.tube_radius >= torus.ring_radius)
+      table.Get("tube_radius").Fail("must be less than ring_radius");
+    return torus;
   }
-  return SolidSphere{table.Get("radius").AsPositive()};
+  const double radius = table.Get("radius").AsPositive();
+  if (kind == "sphere") return SolidSphere{radius};
+  const double length = table.Get("length").AsPositive();
+  return kind == "cylinder" ? Shape(SolidCylinder{radius, length}) : Shape(SolidCapsule{radius, length});
 }
 
 Matrix3d ReadInertia(const TomlValue& value) { return ToTensor(value.AsVector<6>()); }
@@ -134,15 +121,10 @@ Matrix3d ReadInertia(const TomlValue& value) { return ToTensor(value.AsVector<6>
 MassProperties ReadBody(TomlTable& table) {
   table.RejectTogether("shapes", {"mass", "com", "inertia", "bodies"});
   table.RejectTogether("bodies", {"mass", "com", "inertia"});
-  if (const std::optional<TomlValue> bodies = table.Find("bodies")) {
-    std::vector<MassProperties> parts;
-    for (const TomlValue& body : bodies->AsList()) parts.push_back(ReadPart(body));
-    return Combine(parts);
-  }
+  if (const std::optional<TomlValue> bodies = table.Find("bodies"))
+    return Combine(ReadList(bodies->AsList(), ReadPart));
   if (const std::optional<TomlValue> shapes = table.Find("shapes")) {
-    std::vector<MassProperties> parts;
-    for (const TomlValue& shape : shapes->AsList()) parts.push_back(ReadSolid(shape));
-    MassProperties body = Combine(parts);
+    MassProperties body = Combine(ReadList(shapes->AsList(), ReadSolid));
     CheckBody(*shapes, body);
     return body;
   }
@@ -199,29 +181,24 @@ SegmentRow ReadRow(const TomlValue& value, Convention convention) {
                                           {"prismatic", JointType::kPrismatic},
                                           {"ball", JointType::kBall}});
   }
-  // A ball turns about all axes of the link's own frame, placed by a plain transform.
-  if (row.type == JointType::kBall) {
-    row.X_before = ReadPose(table);
-    row.written.is_plain = true;
-    table.RejectUnused();
-    return row;
-  }
   bool is_plain = false;
   for (const char* key : {"xyz", "rpy", "rpy_deg", "axis"}) {
+    if (row.type == JointType::kBall) break;
     table.RejectTogether(key, {"alpha", "alpha_deg", "a", "q", "q_deg", "d"});
     is_plain = is_plain || table.Find(key);
   }
-  if (is_plain) {
+  if (row.type == JointType::kBall) {
+    // It turns about all axes of the link's own frame, placed by a plain transform.
+    row.X_before = ReadPose(table);
+    row.written.is_plain = true;
+  } else if (is_plain) {
     ReadPlainTransform(table, row);
-    table.RejectUnused();
-    return row;
+  } else {
+    row.mdh = {table.GetAngle("alpha"), table.Get("a").AsNumber(), table.GetAngle("q"),
+               table.Get("d").AsNumber()};
+    if (convention == Convention::kClassic) MakeClassic(row);
   }
-  row.mdh.alpha = table.GetAngle("alpha");
-  row.mdh.a = table.Get("a").AsNumber();
-  row.mdh.q = table.GetAngle("q");
-  row.mdh.d = table.Get("d").AsNumber();
   table.RejectUnused();
-  if (convention == Convention::kClassic) MakeClassic(row);
   return row;
 }
 
@@ -232,18 +209,15 @@ std::vector<SegmentRow> ReadRows(TomlTable& table) {
         value->AsChoice<Convention>({{"modified", Convention::kModified}, {"classic", Convention::kClassic}});
   }
   std::vector<SegmentRow> rows;
-  const std::optional<TomlValue> list = table.Find("rows");
-  if (!list) return rows;
-  for (const TomlValue& value : list->AsList()) rows.push_back(ReadRow(value, convention));
+  for (const TomlValue& value : table.FindList("rows")) rows.push_back(ReadRow(value, convention));
   return rows;
 }
 
 MimicEntry ReadMimic(const TomlValue& value) {
   TomlTable table = value.AsTable();
-  const std::optional<TomlValue> multiplier = table.Find("multiplier");
-  const std::optional<TomlValue> offset = table.Find("offset");
-  MimicEntry entry{table.Get("joint"), multiplier ? multiplier->AsNumber() : 1.0,
-                   offset ? offset->AsNumber() : 0.0};
+  const double multiplier = table.Find("multiplier", &TomlValue::AsNumber).value_or(1.0);
+  const double offset = table.Find("offset", &TomlValue::AsNumber).value_or(0.0);
+  MimicEntry entry{table.Get("joint"), multiplier, offset};
   table.RejectUnused();
   return entry;
 }
@@ -254,10 +228,7 @@ JointEntry ReadJointEntry(const TomlValue& value) {
   if (!range) range = table.Miss("range");
   const Vector2d limits = unit * range->AsVector<2>();
   if (limits[0] > limits[1]) range->Fail("lower limit must not exceed upper limit");
-  const auto find = [&](const char* key) {
-    const std::optional<TomlValue> constant = table.Find(key);
-    return constant ? std::optional(constant->AsNotNegative()) : std::nullopt;
-  };
+  const auto find = [&](const char* key) { return table.Find(key, &TomlValue::AsNotNegative); };
   const std::optional<TomlValue> mimic = table.Find("mimic");
   JointEntry entry{value,
                    *range,
@@ -290,30 +261,20 @@ std::map<std::string, Entry> ReadEntries(const std::optional<TomlValue>& value,
   return entries;
 }
 
-/// A list of entries.
-template <typename Entry>
-std::vector<Entry> ReadList(const std::optional<TomlValue>& value, Entry (*read)(const TomlValue&)) {
-  std::vector<Entry> entries;
-  if (!value) return entries;
-  for (const TomlValue& entry : value->AsList()) entries.push_back(read(entry));
-  return entries;
-}
-
 }  // namespace
 
 FrameEntry ReadFrameEntry(const TomlValue& value) {
   TomlTable table = value.AsTable();
-  FrameEntry frame{value, table.Get("name"), table.Get("link"), ReadPose(table), std::nullopt};
-  if (const std::optional<TomlValue> radius = table.Find("sphere_radius")) {
-    frame.sphere_radius = radius->AsPositive();
-  }
+  FrameEntry frame{value, table.Get("name"), table.Get("link"), ReadPose(table),
+                   table.Find("sphere_radius", &TomlValue::AsPositive)};
   table.RejectUnused();
   return frame;
 }
 
 Segment ReadSegment(TomlTable& table) {
   return {ReadRows(table), ReadEntries(table.Find("joints"), ReadJointEntry),
-          ReadEntries(table.Find("links"), ReadLinkEntry), ReadList(table.Find("frames"), ReadFrameEntry)};
+          ReadEntries(table.Find("links"), ReadLinkEntry),
+          ReadList(table.FindList("frames"), ReadFrameEntry)};
 }
 
 }  // namespace dexcheck

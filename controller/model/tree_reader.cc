@@ -79,15 +79,12 @@ class TreeReader {
     if (const std::optional<TomlValue> templates = root.Find("template")) ReadTemplates(*templates);
     // One body that floats is a robot.
     const bool floats = spec_.base.type == BaseType::kFloating;
-    if (const std::optional<TomlValue> chains = floats ? root.Find("chain") : root.Get("chain")) {
-      for (const TomlValue& value : chains->AsList()) ReadChain(value);
-    }
+    for (const TomlValue& value : floats ? root.FindList("chain") : root.Get("chain").AsList())
+      ReadChain(value);
     for (size_t i = 0; i < chains_.size(); ++i) BuildChain(i);
     for (const auto& [joint, mimic] : mimics_)
       spec_.joints[static_cast<size_t>(joint)].coupling = Resolve(joint, mimic);
-    if (const std::optional<TomlValue> frames = root.Find("frame")) {
-      for (const TomlValue& value : frames->AsList()) BuildFrame(ReadFrameEntry(value), value, "");
-    }
+    for (const TomlValue& value : root.FindList("frame")) BuildFrame(ReadFrameEntry(value), value, "");
     RejectUnused();
     return std::move(rows_);
   }
@@ -113,7 +110,7 @@ class TreeReader {
   void ReadChain(const TomlValue& value) {
     TomlTable table = value.AsTable();
     Chain chain{value, table.Get("parent"), "", Pose::Identity(), ReadSegment(table)};
-    if (const std::optional<TomlValue> prefix = table.Find("prefix")) chain.prefix = prefix->AsPartName();
+    chain.prefix = table.Find("prefix", &TomlValue::AsPartName).value_or("");
     if (const std::optional<TomlValue> pose = table.Find("pose")) chain.X_PB = ReadPose(*pose);
     if (const std::optional<TomlValue> name = table.Find("template")) chain.common = FindTemplate(*name);
     table.RejectUnused();

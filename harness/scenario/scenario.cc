@@ -24,7 +24,7 @@ std::string ReadPath(TomlTable& table, std::string_view key, const std::filesyst
 void ReadModel(const TomlValue& value, const std::filesystem::path& folder, Scenario* scenario) {
   TomlTable table = value.AsTable();
   scenario->model_file = ReadPath(table, "file", folder);
-  for (const TomlValue& entry : ListEntries(table, "overrides"))
+  for (const TomlValue& entry : table.FindList("overrides"))
     scenario->model_overrides.push_back(entry.AsText());
   scenario->own_model_overrides = scenario->model_overrides.size();
   table.RejectUnused();
@@ -68,7 +68,7 @@ void ReadPlant(const TomlValue& value, const std::filesystem::path& folder, Scen
   if (const auto count = table.Find("noslip_iterations")) {
     plant.noslip_iterations = static_cast<int>(count->AsWhole(0, kMaxNoslipIterations));
   }
-  for (const TomlValue& entry : ListEntries(table, "allowed_collision_pairs")) {
+  for (const TomlValue& entry : table.FindList("allowed_collision_pairs")) {
     const std::vector<TomlValue> bodies = entry.AsList();
     if (bodies.size() != 2) entry.Reject("must name two bodies");
     plant.allowed_collision_pairs.emplace_back(bodies[0].AsPartName(), bodies[1].AsPartName());

@@ -174,7 +174,7 @@ Imperfections ReadImperfections(TomlTable& root, double time_step) {
     ListKeys(*actuation, &all.declared);
   }
   size_t number = 0;
-  for (const TomlValue& entry : ListEntries(root, "disturbance")) {
+  for (const TomlValue& entry : root.FindList("disturbance")) {
     ReadDisturbance(entry, number++, time_step, &all);
     all.declared.push_back(entry.path() + " = " + entry.Show());
   }

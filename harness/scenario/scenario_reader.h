@@ -58,12 +58,6 @@ void ReadKeys(TomlTable& table, std::initializer_list<Key<Options>> keys, Option
   }
 }
 
-/// The entries of a list that the table need not have.
-inline std::vector<TomlValue> ListEntries(TomlTable& table, const char* key) {
-  const std::optional<TomlValue> list = table.Find(key);
-  return list ? list->AsList() : std::vector<TomlValue>();
-}
-
 /// Reads one of some words, if the table has the key.
 template <typename Choice>
 void ReadChoice(TomlTable& table, const char* key,

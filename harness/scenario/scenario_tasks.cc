@@ -219,7 +219,7 @@ JointNumbers ReadJointNumbers(TomlTable& table, const std::string& key) {
 /// Reads way points, each after the one before. @param read makes one at a time.
 template <typename Point, typename Read>
 void ReadPoints(TomlTable& table, const Read& read, std::vector<Point>* points) {
-  for (const TomlValue& entry : ListEntries(table, "points")) {
+  for (const TomlValue& entry : table.FindList("points")) {
     TomlTable point = entry.AsTable();
     const TomlValue time = point.Get("time");
     if (time.AsPositive() <= (points->empty() ? 0.0 : points->back().time))
@@ -269,7 +269,7 @@ JointTask ReadJointMotion(const TomlValue& value) {
     return {time, std::move(joints)};
   };
   ReadPoints(table, read, &task.points);
-  for (const TomlValue& entry : ListEntries(table, "oscillations"))
+  for (const TomlValue& entry : table.FindList("oscillations"))
     task.oscillations.push_back(ReadOscillation(entry));
   table.RejectUnused();
   return task;
@@ -304,7 +304,7 @@ StanceTask ReadStance(const TomlValue& value) {
     return {time, ReadCoordinates(point, "xyz", "rpy")};
   };
   ReadPoints(table, read, &task.points);
-  for (const TomlValue& entry : ListEntries(table, "oscillations"))
+  for (const TomlValue& entry : table.FindList("oscillations"))
     task.oscillations.push_back(ReadStanceOscillation(entry));
   table.RejectUnused();
   return task;

@@ -241,7 +241,7 @@ Sample ReadSample(const TomlValue& value) {
 void ReadMetrics(TomlTable& root, Study* study) {
   std::vector<std::string> known;
   for (const MetricInfo& metric : kMetrics) known.emplace_back(metric.name);
-  for (const TomlValue& entry : ListEntries(root, "metrics")) {
+  for (const TomlValue& entry : root.FindList("metrics")) {
     const std::string name = entry.AsName();
     if (!FindMetric(name)) entry.Reject("no metric is called " + Quote(name) + SuggestNearest(name, known));
     study->metrics.push_back(name);
@@ -367,7 +367,7 @@ Study ReadStudy(TomlTable& root, Study study) {
   if (const auto description = root.Find("description")) study.description = description->AsText();
   study.scenario = root.Get("scenario").AsText();
   if (const auto controller = root.Find("controller")) study.controller = controller->AsText();
-  for (const TomlValue& entry : ListEntries(root, "set")) {
+  for (const TomlValue& entry : root.FindList("set")) {
     study.overrides.push_back(entry.AsText());
     if (study.overrides.back().find('=') == std::string::npos) entry.Fail("must be KEY=VALUE");
   }
@@ -390,9 +390,8 @@ Study ReadStudy(TomlTable& root, Study study) {
   if (study.variations.empty()) vary.Reject("needs at least one key");
   if (study.sample.method == SamplingMethod::kSobol && study.variations.size() > kMaxSobolDimensions)
     vary.Reject("a Sobol sequence varies at most " + std::to_string(kMaxSobolDimensions) + " keys");
-  for (const TomlValue& entry : ListEntries(root, "objective"))
-    study.objectives.push_back(ReadObjective(entry));
-  for (const TomlValue& entry : ListEntries(root, "constraints"))
+  for (const TomlValue& entry : root.FindList("objective")) study.objectives.push_back(ReadObjective(entry));
+  for (const TomlValue& entry : root.FindList("constraints"))
     study.constraints.push_back(ReadConstraint(entry));
   if (search) ReadSearch(*search, &study);
   RequireFewTrials(vary, study);
