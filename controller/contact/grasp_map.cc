@@ -55,16 +55,6 @@ void RequireRowsShape(Eigen::Index columns, Eigen::Ref<MatrixXd> rows) {
           "must equal those of the fingertip Jacobian", rows.cols());
 }
 
-/// Calls visit(i) for the columns of each run, or for all columns when there are no runs.
-template <typename Visit>
-void ForEachColumn(std::span<const ColumnRun> columns, Eigen::Index all, const Visit& visit) {
-  const ColumnRun whole{0, all};
-  if (columns.empty()) columns = {&whole, 1};
-  for (const ColumnRun& run : columns) {
-    for (Eigen::Index i = run.begin; i < run.begin + run.count; ++i) visit(i);
-  }
-}
-
 }  // namespace
 
 void CalcGraspMap(std::span<const Contact> contacts, Eigen::Ref<Matrix6Xd> G) {
@@ -91,17 +81,16 @@ void CalcGraspMapDot(std::span<const Contact> contacts, Eigen::Ref<Matrix6Xd> G_
 }
 
 void CalcContactJacobian(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
-                         Eigen::Ref<MatrixXd> rows, std::span<const ColumnRun> columns) {
+                         Eigen::Ref<MatrixXd> rows) {
   RequireRowsShape(J_f.cols(), rows);
   // B_c^T Ad_{g_cf_f} J_f
   const Matrix36 A = CalcAdjointInverse(contact.geometry.g_f_cf).topRows<3>();
   auto J = rows.topRows<3>();
-  ForEachColumn(columns, J_f.cols(), [&](Eigen::Index i) { J.col(i).noalias() = A * J_f.col(i); });
+  for (Eigen::Index i = 0; i < J_f.cols(); ++i) J.col(i).noalias() = A * J_f.col(i);
 }
 
 void CalcContactJacobianDot(const Contact& contact, const Eigen::Ref<const Matrix6Xd>& J_f,
-                            const Eigen::Ref<const Matrix6Xd>& J_f_dot, Eigen::Ref<MatrixXd> rows_dot,
-                            std::span<const ColumnRun> columns) {
+                            const Eigen::Ref<const Matrix6Xd>& J_f_dot, Eigen::Ref<MatrixXd> rows_dot) {
   RequireRowsShape(J_f.cols(), rows_dot);
   Require(J_f_dot.cols() == J_f.cols(), "columns of J_f_dot", "must equal those of J_f", J_f_dot.cols());
   // d/dt (Ad_{g_cf_f} J_f) = Ad_{g_cf_f} J_f_dot - ad_V Ad_{g_cf_f} J_f with V = V_f_cf^cf
@@ -111,8 +100,8 @@ void CalcContactJacobianDot(const Contact& contact, const Eigen::Ref<const Matri
   const Matrix36 A = Ad.topRows<3>();
   const Matrix36 A_dot = Ad_dot.topRows<3>();
   auto J_dot = rows_dot.topRows<3>();
-  ForEachColumn(columns, J_f.cols(),
-                [&](Eigen::Index i) { J_dot.col(i).noalias() = A * J_f_dot.col(i) + A_dot * J_f.col(i); });
+  for (Eigen::Index i = 0; i < J_f.cols(); ++i)
+    J_dot.col(i).noalias() = A * J_f_dot.col(i) + A_dot * J_f.col(i);
 }
 
 }  // namespace dexcheck

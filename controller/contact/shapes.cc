@@ -58,32 +58,6 @@ SurfacePoint CalcBestLatitudeCoordinates(const Vector3d& direction) {
   return HasLatitudeMargin(first) ? first : CalcLatitudeCoordinates(direction, 1);
 }
 
-SurfacePoint ChangeLatitudeChart(const SurfacePoint& alpha, int chart) {
-  if (chart == alpha.chart && std::abs(alpha.v) <= kPi / 2.0) return {WrapAngle(alpha.u), alpha.v, chart};
-  return CalcLatitudeCoordinates(CalcUnitSpherePoint(alpha), chart);
-}
-
-// c = D s(u, v) with s on the unit sphere and D = diag(semi_axes).
-SurfaceJet CalcLatitudeJet(const Vector3d& semi_axes, const SurfacePoint& alpha) {
-  const double cu = std::cos(alpha.u);
-  const double su = std::sin(alpha.u);
-  const double cv = std::cos(alpha.v);
-  const double sv = std::sin(alpha.v);
-  if (!(cv > kPoleCosine)) {
-    throw SingularityError("latitude v is at or beyond the chart's pole [rad]: " + std::to_string(alpha.v),
-                           alpha.v);
-  }
-  const auto scale = [&](double x, double y, double z) -> Vector3d {
-    return semi_axes.cwiseProduct(ToBodyAxes({x, y, z}, alpha.chart));
-  };
-  return {.c = scale(cv * cu, cv * su, sv),
-          .c_u = scale(-cv * su, cv * cu, 0.0),
-          .c_v = scale(-sv * cu, -sv * su, cv),
-          .c_uu = scale(-cv * cu, -cv * su, 0.0),
-          .c_uv = scale(sv * su, -sv * cu, 0.0),
-          .c_vv = scale(-cv * cu, -cv * su, -sv)};
-}
-
 // A face of a box: its normal's axis and side, and the axes of u and v, of which c_u x c_v points outwards.
 struct Face {
   int axis, u, v;
@@ -97,29 +71,31 @@ Face FaceOf(int chart) {
   return chart % 2 == 0 ? Face{axis, next, last, 1.0} : Face{axis, last, next, -1.0};
 }
 
+// The point of a face that is u and v from its middle.
+Vector3d PlaceOnFace(const Face& face, const Vector3d& half_size, double u, double v) {
+  Vector3d p;
+  p[face.axis] = face.side * half_size[face.axis];
+  p[face.u] = u;
+  p[face.v] = v;
+  return p;
+}
+
 // How far rounding may carry a contact beyond an edge, relative to the face.
 constexpr double kEdgeRounding = 1e-9;
 
 struct SurfaceMaker {
-  std::unique_ptr<Surface> operator()(const SolidSphere& sphere) const {
-    return std::make_unique<Sphere>(sphere.radius);
+  using Made = std::unique_ptr<Surface>;
+  Made operator()(const SolidSphere& solid) const { return std::make_unique<Sphere>(solid.radius); }
+  Made operator()(const SolidCylinder& solid) const { return std::make_unique<Cylinder>(solid.radius); }
+  Made operator()(const SolidTorus& solid) const {
+    return std::make_unique<Torus>(solid.ring_radius, solid.tube_radius);
   }
-  std::unique_ptr<Surface> operator()(const SolidCylinder& cylinder) const {
-    return std::make_unique<Cylinder>(cylinder.radius);
+  Made operator()(const SolidBox& solid) const { return std::make_unique<Box>(0.5 * solid.size); }
+  Made operator()(const SolidEllipsoid& solid) const { return std::make_unique<Ellipsoid>(solid.semi_axes); }
+  Made operator()(const SolidCapsule&) const {
+    throw std::invalid_argument(
+        "object shape: must be a sphere, a cylinder, an ellipsoid, a box or a torus for contact terms");
   }
-  std::unique_ptr<Surface> operator()(const SolidTorus& torus) const {
-    return std::make_unique<Torus>(torus.ring_radius, torus.tube_radius);
-  }
-  std::unique_ptr<Surface> operator()(const SolidBox& box) const {
-    return std::make_unique<Box>(0.5 * box.size);
-  }
-  std::unique_ptr<Surface> operator()(const SolidEllipsoid& ellipsoid) const {
-    return std::make_unique<Ellipsoid>(ellipsoid.semi_axes);
-  }
-  std::unique_ptr<Surface> operator()(const SolidCapsule&) const { throw std::invalid_argument(kNotSmooth); }
-
-  static constexpr const char* kNotSmooth =
-      "object shape: must be a sphere, a cylinder, an ellipsoid, a box or a torus for contact terms";
 };
 
 }  // namespace
@@ -127,12 +103,7 @@ struct SurfaceMaker {
 SurfaceProjection Plane::Project(const Vector3d& p) const { return {{p.x(), p.y(), 0}, p.z()}; }
 
 SurfaceJet Plane::DoCalcJet(const SurfacePoint& alpha) const {
-  return {.c = {alpha.u, alpha.v, 0.0},
-          .c_u = Vector3d::UnitX(),
-          .c_v = Vector3d::UnitY(),
-          .c_uu = Vector3d::Zero(),
-          .c_uv = Vector3d::Zero(),
-          .c_vv = Vector3d::Zero()};
+  return {.c = {alpha.u, alpha.v, 0.0}, .c_u = Vector3d::UnitX(), .c_v = Vector3d::UnitY()};
 }
 
 SurfacePoint Plane::DoToChart(const SurfacePoint& alpha, int /*chart*/) const { return alpha; }
@@ -151,37 +122,49 @@ SurfaceJet Cylinder::DoCalcJet(const SurfacePoint& alpha) const {
   return {.c = {radius_ * cu, radius_ * su, alpha.v},
           .c_u = {-radius_ * su, radius_ * cu, 0.0},
           .c_v = Vector3d::UnitZ(),
-          .c_uu = {-radius_ * cu, -radius_ * su, 0.0},
-          .c_uv = Vector3d::Zero(),
-          .c_vv = Vector3d::Zero()};
+          .c_uu = {-radius_ * cu, -radius_ * su, 0.0}};
 }
 
 SurfacePoint Cylinder::DoToChart(const SurfacePoint& alpha, int chart) const {
   return {WrapAngle(alpha.u), alpha.v, chart};
 }
 
-SurfaceJet LatitudeSurface::DoCalcJet(const SurfacePoint& alpha) const {
-  return CalcLatitudeJet(semi_axes_, alpha);
+Ellipsoid::Ellipsoid(const Vector3d& semi_axes, const char* name) : semi_axes_(semi_axes) {
+  for (const double semi_axis : semi_axes) RequirePositive(semi_axis, name);
 }
 
-SurfacePoint LatitudeSurface::DoToChart(const SurfacePoint& alpha, int chart) const {
-  return ChangeLatitudeChart(alpha, chart);
+SurfaceJet Ellipsoid::DoCalcJet(const SurfacePoint& alpha) const {
+  // c = D s(u, v) with s on the unit sphere and D = diag(semi_axes)
+  const double cu = std::cos(alpha.u);
+  const double su = std::sin(alpha.u);
+  const double cv = std::cos(alpha.v);
+  const double sv = std::sin(alpha.v);
+  if (!(cv > kPoleCosine)) {
+    throw SingularityError("latitude v is at or beyond the chart's pole [rad]: " + std::to_string(alpha.v),
+                           alpha.v);
+  }
+  const auto scale = [&](double x, double y, double z) -> Vector3d {
+    return semi_axes_.cwiseProduct(ToBodyAxes({x, y, z}, alpha.chart));
+  };
+  return {.c = scale(cv * cu, cv * su, sv),
+          .c_u = scale(-cv * su, cv * cu, 0.0),
+          .c_v = scale(-sv * cu, -sv * su, cv),
+          .c_uu = scale(-cv * cu, -cv * su, 0.0),
+          .c_uv = scale(sv * su, -sv * cu, 0.0),
+          .c_vv = scale(-cv * cu, -cv * su, -sv)};
 }
 
-bool LatitudeSurface::DoHasMargin(const SurfacePoint& alpha) const { return HasLatitudeMargin(alpha); }
-
-Sphere::Sphere(double radius) : LatitudeSurface(Vector3d::Constant(radius)) {
-  RequirePositive(radius, "sphere radius [m]");
+SurfacePoint Ellipsoid::DoToChart(const SurfacePoint& alpha, int chart) const {
+  if (chart == alpha.chart && std::abs(alpha.v) <= kPi / 2.0) return {WrapAngle(alpha.u), alpha.v, chart};
+  return CalcLatitudeCoordinates(CalcUnitSpherePoint(alpha), chart);
 }
+
+bool Ellipsoid::DoHasMargin(const SurfacePoint& alpha) const { return HasLatitudeMargin(alpha); }
 
 SurfaceProjection Sphere::Project(const Vector3d& p) const {
   const double centre_distance = p.norm();
   RequireUnique(centre_distance, radius(), "the sphere's centre");
   return {CalcBestLatitudeCoordinates(p), centre_distance - radius()};
-}
-
-Ellipsoid::Ellipsoid(const Vector3d& semi_axes) : LatitudeSurface(semi_axes) {
-  for (const double semi_axis : semi_axes) RequirePositive(semi_axis, "ellipsoid semi-axis [m]");
 }
 
 SurfaceProjection Ellipsoid::Project(const Vector3d& p) const {
@@ -250,25 +233,14 @@ SurfaceJet Box::DoCalcJet(const SurfacePoint& alpha) const {
                                ", at (u, v) [m]: " + std::to_string(alpha.u) + ", " + std::to_string(alpha.v),
                            over);
   }
-  SurfaceJet jet{.c = Vector3d::Zero(),
-                 .c_u = Vector3d::Unit(face.u),
-                 .c_v = Vector3d::Unit(face.v),
-                 .c_uu = Vector3d::Zero(),
-                 .c_uv = Vector3d::Zero(),
-                 .c_vv = Vector3d::Zero()};
-  jet.c[face.axis] = face.side * half_size_[face.axis];
-  jet.c[face.u] = alpha.u;
-  jet.c[face.v] = alpha.v;
-  return jet;
+  return {.c = PlaceOnFace(face, half_size_, alpha.u, alpha.v),
+          .c_u = Vector3d::Unit(face.u),
+          .c_v = Vector3d::Unit(face.v)};
 }
 
 SurfacePoint Box::DoToChart(const SurfacePoint& alpha, int chart) const {
   if (chart == alpha.chart) return alpha;
-  const Face from = FaceOf(alpha.chart);
-  Vector3d p;
-  p[from.axis] = from.side * half_size_[from.axis];
-  p[from.u] = alpha.u;
-  p[from.v] = alpha.v;
+  const Vector3d p = PlaceOnFace(FaceOf(alpha.chart), half_size_, alpha.u, alpha.v);
   const Face to = FaceOf(chart);
   const auto clamp = [&](int i) { return std::clamp(p[i], -half_size_[i], half_size_[i]); };
   return {clamp(to.u), clamp(to.v), chart};

@@ -35,39 +35,32 @@ class Cylinder final : public Surface {
   double radius_;
 };
 
-/// Base of sphere and ellipsoid: u longitude and v latitude in two charts of the unit sphere, whose points
-/// are scaled by the semi-axes.
-class LatitudeSurface : public Surface {
+/// Ellipsoid about the origin with three free semi-axes along x, y, z: the unit sphere in two charts, u
+/// longitude and v latitude, each coordinate scaled by its semi-axis. Chart 0 has its poles on z, c(u, v) =
+/// (a cos v cos u, b cos v sin u, c sin v); chart 1 has them on x, the axes exchanged cyclically. Not
+/// orthogonal unless a = b.
+class Ellipsoid : public Surface {
  public:
+  /// Throws std::invalid_argument unless all semi-axes (3x1, m) are positive.
+  explicit Ellipsoid(const Vector3d& semi_axes, const char* name = "ellipsoid semi-axis [m]");
+  [[nodiscard]] const Vector3d& semi_axes() const { return semi_axes_; }
   [[nodiscard]] int num_charts() const final { return 2; }
-
- protected:
-  explicit LatitudeSurface(const Vector3d& semi_axes) : semi_axes_(semi_axes) {}
-  Vector3d semi_axes_;
+  [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
 
  private:
   [[nodiscard]] SurfaceJet DoCalcJet(const SurfacePoint& alpha) const final;
   [[nodiscard]] SurfacePoint DoToChart(const SurfacePoint& alpha, int chart) const final;
   [[nodiscard]] bool DoHasMargin(const SurfacePoint& alpha) const final;
+
+  Vector3d semi_axes_;
 };
 
-/// Sphere about the origin. Chart 0 has its poles on z, c(u, v) = rho (cos v cos u, cos v sin u, sin v);
-/// chart 1 has them on x, the axes exchanged cyclically.
-class Sphere final : public LatitudeSurface {
+/// Sphere about the origin, an ellipsoid whose closest points are known without iteration.
+class Sphere final : public Ellipsoid {
  public:
   /// Throws std::invalid_argument unless radius (m) is positive.
-  explicit Sphere(double radius);
-  [[nodiscard]] double radius() const { return semi_axes_.x(); }
-  [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
-};
-
-/// Ellipsoid with three free semi-axes along x, y, z; the sphere's charts, each coordinate scaled by its
-/// semi-axis: c(u, v) = (a cos v cos u, b cos v sin u, c sin v). Not orthogonal unless a = b.
-class Ellipsoid final : public LatitudeSurface {
- public:
-  /// Throws std::invalid_argument unless all semi-axes (3x1, m) are positive.
-  explicit Ellipsoid(const Vector3d& semi_axes);
-  [[nodiscard]] const Vector3d& semi_axes() const { return semi_axes_; }
+  explicit Sphere(double radius) : Ellipsoid(Vector3d::Constant(radius), "sphere radius [m]") {}
+  [[nodiscard]] double radius() const { return semi_axes().x(); }
   [[nodiscard]] SurfaceProjection Project(const Vector3d& p) const override;
 };
 

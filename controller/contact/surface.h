@@ -25,7 +25,7 @@ struct SurfacePoint {
 struct SurfaceJet {
   Vector3d c;
   Vector3d c_u, c_v;
-  Vector3d c_uu, c_uv, c_vv;
+  Vector3d c_uu = Vector3d::Zero(), c_uv = Vector3d::Zero(), c_vv = Vector3d::Zero();
 };
 
 /// Geometry of a surface at one point: Gauss frame (38) and the geometric parameters M, K, T (37).

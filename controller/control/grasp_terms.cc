@@ -1,6 +1,7 @@
 #include "controller/control/grasp_terms.h"
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 
 #include "controller/common/errors.h"
@@ -11,14 +12,11 @@ namespace dexcheck {
 
 namespace {
 
-/// J xi of a J (kRows x n) that has other columns than these zero.
+/// J xi of a J (kRows x n), column by column: most may be zero.
 template <int kRows, typename Matrix>
-Eigen::Matrix<double, kRows, 1> MultiplyColumns(const Matrix& J, std::span<const ColumnRun> columns,
-                                                const VectorXd& xi) {
+Eigen::Matrix<double, kRows, 1> MultiplyColumns(const Matrix& J, const VectorXd& xi) {
   Eigen::Matrix<double, kRows, 1> product = Eigen::Matrix<double, kRows, 1>::Zero();
-  for (const ColumnRun& run : columns) {
-    for (Eigen::Index i = run.begin; i < run.begin + run.count; ++i) product += xi[i] * J.col(i);
-  }
+  for (Eigen::Index i = 0; i < J.cols(); ++i) product += xi[i] * J.col(i);
   return product;
 }
 
@@ -42,22 +40,11 @@ GraspTerms::GraspTerms(const RobotModel& model, std::span<const int> fingertips,
   tip_jacobians_.assign(fingertips_.size(), {Matrix6Xd::Zero(6, n), Matrix6Xd::Zero(6, n)});
   slip_.setZero(k);
   slip_bias_.setZero(k);
-  ListChains(model);
-}
-
-void GraspTerms::ListChains(const RobotModel& model) {
-  std::vector<bool> moves_any(static_cast<size_t>(model.num_velocities()), false);
+  std::set<int> moving;
   for (const int frame : fingertips_) {
-    std::vector<ColumnRun>& runs = chains_.emplace_back();
-    for (const int i : model.ListMovingEntries(model.frame(frame).link)) {
-      moves_any[static_cast<size_t>(i)] = true;
-      if (runs.empty() || runs.back().begin + runs.back().count != i) runs.push_back({i, 0});
-      ++runs.back().count;
-    }
+    for (const int i : model.ListMovingEntries(model.frame(frame).link)) moving.insert(i);
   }
-  for (int i = 0; i < model.num_velocities(); ++i) {
-    if (moves_any[static_cast<size_t>(i)]) moving_entries_.push_back(i);
-  }
+  moving_entries_.assign(moving.begin(), moving.end());
 }
 
 void GraspTerms::SetOverlaps(std::span<const double> overlaps) {
@@ -129,15 +116,15 @@ void GraspTerms::SetContacts(const ModelTerms& robot, std::span<const ContactCoo
     Contact& contact = contacts_[i];
     auto& [J_f, J_f_dot] = tip_jacobians_[i];
     robot.CalcFrameColumns(fingertips_[i], J_f, J_f_dot);
-    const Vector6d V_f = MultiplyColumns<6>(J_f, chains_[i], robot.velocity());
+    const Vector6d V_f = MultiplyColumns<6>(J_f, robot.velocity());
     contact.geometry = CalcContactGeometry(tips_[i], *surface_, kappa[i], overlaps_[i]);
     if (!bonds_.empty()) {
       SetBond(robot.CalcFramePose(fingertips_[i]), V_f, i);
       continue;
     }
     contact.kappa_dot = CalcKappaDot(contact.geometry, CalcRelativeTwist(contact.geometry, V_f, V_Bo_));
-    CalcContactJacobian(contact, J_f, J_B_.middleRows(row, 3), chains_[i]);
-    CalcContactJacobianDot(contact, J_f, J_f_dot, J_B_dot_.middleRows(row, 3), chains_[i]);
+    CalcContactJacobian(contact, J_f, J_B_.middleRows(row, 3));
+    CalcContactJacobianDot(contact, J_f, J_f_dot, J_B_dot_.middleRows(row, 3));
   }
   if (fingertips_.empty()) return;  // nothing is held
   CalcGraspMap(contacts_, G_);
@@ -148,10 +135,9 @@ void GraspTerms::SetContacts(const ModelTerms& robot, std::span<const ContactCoo
 void GraspTerms::CalcSlip(const VectorXd& xi, size_t finger) {
   // (45), (46)
   const Eigen::Index row = 3 * static_cast<Eigen::Index>(finger);
-  const auto& chain = chains_[finger];
-  slip_.segment<3>(row) = MultiplyColumns<3>(J_B_.middleRows<3>(row), chain, xi);
+  slip_.segment<3>(row) = MultiplyColumns<3>(J_B_.middleRows<3>(row), xi);
   slip_.segment<3>(row) -= G_.middleCols<3>(row).transpose() * V_Bo_;
-  slip_bias_.segment<3>(row) = MultiplyColumns<3>(J_B_dot_.middleRows<3>(row), chain, xi);
+  slip_bias_.segment<3>(row) = MultiplyColumns<3>(J_B_dot_.middleRows<3>(row), xi);
   slip_bias_.segment<3>(row) -= G_dot_.middleCols<3>(row).transpose() * V_Bo_;
 }
 

@@ -102,18 +102,16 @@ class GraspTerms {
 
  private:
   void SetContacts(const ModelTerms& robot, std::span<const ContactCoordinates> kappa);
-  void ListChains(const RobotModel& model);
   void SetBond(const Pose& X_Bf, const Vector6d& V_f, size_t finger);
   void CalcSlip(const VectorXd& xi, size_t finger);
   void RequireCoordinates() const;
 
   struct TipJacobian {
-    Matrix6Xd J, J_dot;  // zero but for the columns of the fingertip's chain
+    Matrix6Xd J, J_dot;
   };
 
   std::vector<int> fingertips_;
   std::vector<Sphere> tips_;
-  std::vector<std::vector<ColumnRun>> chains_;  // entries of xi that move each fingertip
   std::vector<int> moving_entries_;
   MassProperties object_;
   Vector3d gravity_;
