@@ -144,7 +144,7 @@ class TomlTable {
   TomlValue Get(std::string_view key);
   /// The value under a key that may be missing.
   std::optional<TomlValue> Find(std::string_view key);
-  /// What a function of TomlValue makes of it.
+  /// A function of TomlValue reads that value.
   template <typename T>
   std::optional<T> Find(std::string_view key, T (TomlValue::*as)() const) {
     const std::optional<TomlValue> value = Find(key);

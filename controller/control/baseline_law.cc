@@ -100,10 +100,7 @@ BaselineLaw::BaselineLaw(const RobotModel& model, int num_contacts, ControlLaw l
   if (options.weight.kind == RedundancyWeight::Kind::kDiagonal) {
     Require(options.weight.w.size() == n, "length of w", "must be that of xi", options.weight.w.size());
   }
-  xi_d_.setZero(n);
-  xi_dot_d_.setZero(n);
-  force_.setZero(n);
-  work_.setZero(n);
+  for (VectorXd* vector : {&xi_d_, &xi_dot_d_, &force_, &work_}) vector->setZero(n);
   rates_.setZero(Eigen::Index{3} * num_contacts);
 }
 

@@ -30,13 +30,8 @@ ComputedTorque::ComputedTorque(const RobotModel& model, int num_contacts, Redund
   if (weight_.kind == RedundancyWeight::Kind::kDiagonal) {
     Require(weight_.w.size() == n, "length of w", "must be that of xi", weight_.w.size());
   }
-  xi_c_.setZero(n);
-  xi_dot_d_.setZero(n);
-  tau_0_.setZero(n);
-  tau_.setZero(n);
-  work_.setZero(n);
-  f_c_.setZero(k);
-  rates_.setZero(k);
+  for (VectorXd* vector : {&xi_c_, &xi_dot_d_, &tau_0_, &tau_, &work_}) vector->setZero(n);
+  for (VectorXd* of_contacts : {&f_c_, &rates_}) of_contacts->setZero(k);
 }
 
 void ComputedTorque::SetDemand(const ModelTerms& robot, const GraspTerms& grasp, const Vector6d& V_Bo_dot,

@@ -225,16 +225,8 @@ RobotModel::RobotModel(RobotSpec spec) : spec_(std::move(spec)) {
 }
 
 int RobotModel::num_base_positions() const {
-  switch (spec_.base.type) {
-    case BaseType::kPlanar:
-    case BaseType::kDifferentialDrive:
-      return 3;
-    case BaseType::kFloating:
-      return 7;
-    case BaseType::kFixed:
-      break;
-  }
-  return 0;
+  if (spec_.base.type == BaseType::kFixed) return 0;
+  return spec_.base.type == BaseType::kFloating ? 7 : 3;
 }
 
 int RobotModel::num_base_velocities() const {

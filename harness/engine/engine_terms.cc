@@ -49,13 +49,9 @@ EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates, std::s
   q_.setZero(adapter.model().num_positions());
   M_.setZero(n, n);
   mass_nv_.setZero(nv, nv);
-  force_nv_.setZero(nv);
-  bracket_nv_.setZero(nv);
-  coriolis_.setZero(n);
-  gravity_.setZero(n);
-  friction_.setZero(n);
-  other_velocity_.setZero(n);
-  other_force_.setZero(n);
+  for (VectorXd* of_engine : {&force_nv_, &bracket_nv_}) of_engine->setZero(nv);
+  for (VectorXd* vector : {&coriolis_, &gravity_, &friction_, &other_velocity_, &other_force_})
+    vector->setZero(n);
   FindObject();
   ListChains(frames);
   // Gravity is formed from the masses' places, so that the bias force is Coriolis alone.

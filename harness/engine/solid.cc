@@ -14,62 +14,52 @@ namespace {
 /// MJCFs keep the geoms that collide in this group, which viewers do not show.
 constexpr int kCollisionGroup = 3;
 
-void ReadHull(const mjModel& m, int geom, Solid* solid) {
+/// @return how far its vertices reach, m.
+double ReadHull(const mjModel& m, int geom, Solid* solid) {
   const int mesh = m.geom_dataid[geom];
   const float* const first = m.mesh_vert + 3 * m.mesh_vertadr[mesh];
   // The engine's hull of a mesh that collides: how many vertices and faces, where their edges are, and which.
   const int* const hull = m.mesh_graphadr[mesh] < 0 ? nullptr : m.mesh_graph + m.mesh_graphadr[mesh];
   const int count = hull == nullptr ? m.mesh_vertnum[mesh] : hull[0];
+  double reach = 0.0;
   for (int i = 0; i < count; ++i) {
     const int vertex = hull == nullptr ? i : hull[2 + count + i];
     solid->vertices.push_back(Eigen::Map<const Eigen::Vector3f>(first + 3 * vertex).cast<double>());
-    solid->reach = std::max(solid->reach, solid->vertices.back().norm());
+    reach = std::max(reach, solid->vertices.back().norm());
   }
+  return reach;
 }
 
 /// Reads the shape of a geom; false for a geom without a shape here.
 bool ReadShape(const mjModel& m, int geom, Solid* solid) {
   using enum Solid::Shape;
   const Vector3d& size = solid->size;
+  const auto take = [&](Solid::Shape shape, double reach) {
+    solid->shape = shape;
+    solid->reach = reach;
+    return true;
+  };
   double ring = 0.0;
   double tube = 0.0;
   switch (m.geom_type[geom]) {
     case mjGEOM_PLANE:
-      solid->shape = kPlane;
-      solid->reach = std::numeric_limits<double>::infinity();
-      return true;
+      return take(kPlane, std::numeric_limits<double>::infinity());
     case mjGEOM_SPHERE:
-      solid->shape = kSphere;
-      solid->reach = size[0];
-      return true;
+      return take(kSphere, size[0]);
     case mjGEOM_CAPSULE:
-      solid->shape = kCapsule;
-      solid->reach = size[0] + size[1];
-      return true;
+      return take(kCapsule, size[0] + size[1]);
     case mjGEOM_CYLINDER:
-      solid->shape = kCylinder;
-      solid->reach = size.head<2>().norm();
-      return true;
+      return take(kCylinder, size.head<2>().norm());
     case mjGEOM_ELLIPSOID:
-      solid->shape = kEllipsoid;
-      solid->reach = size.maxCoeff();
-      return true;
+      return take(kEllipsoid, size.maxCoeff());
     case mjGEOM_BOX:
-      solid->shape = kBox;
-      solid->reach = size.norm();
-      return true;
+      return take(kBox, size.norm());
     case mjGEOM_MESH:
-      if (!GetTorusRadii(m, geom, &ring, &tube)) {
-        solid->shape = kHull;
-        ReadHull(m, geom, solid);
-        return true;
-      }
+      if (!GetTorusRadii(m, geom, &ring, &tube)) return take(kHull, ReadHull(m, geom, solid));
       // About the body's own axis; see InstallExactCollision.
-      solid->shape = kTorus;
       solid->X_BG = Pose::Identity();
       solid->size = Vector3d(ring, tube, 0.0);
-      solid->reach = ring + tube;
-      return true;
+      return take(kTorus, ring + tube);
     default:
       return false;
   }
