@@ -62,37 +62,40 @@ constexpr const char* kSixWords[] = {
 constexpr const char* kSixIds[] = {"by_rows", "by_columns", "products_yz_xz_xy", "products_xy_yz_xz",
                                    "products_xz_xy_yz"};
 
-/// Names of a quantity: in an id and in words.
+/// A quantity: its names in an id and in words, and units that it may be taken in.
 struct SiteWords {
   SiteKind kind;
   const char* id;
   const char* words;
+  std::span<const UnitFault> units = {};
 };
 constexpr SiteWords kSites[] = {{SiteKind::kCarrier, "carrier", "carrying link"},
                                 {SiteKind::kPresence, "joint", "joint"},
                                 {SiteKind::kName, "joint", "name"},
                                 {SiteKind::kLinkName, "link", "name"},
                                 {SiteKind::kType, "type", "type"},
-                                {SiteKind::kPosition, "origin", "position"},
+                                {SiteKind::kPosition, "origin", "position", kLengths},
                                 {SiteKind::kRotation, "rotation", "rotation"},
                                 {SiteKind::kAxis, "axis", "axis"},
                                 {SiteKind::kAxisPoint, "axis_point", "point of the axis"},
-                                {SiteKind::kRange, "range", "range"},
+                                {SiteKind::kRange, "range", "range", kRanges},
                                 {SiteKind::kMimic, "coupling", "mimic"},
-                                {SiteKind::kDamping, "damping", "damping"},
-                                {SiteKind::kFriction, "friction", "friction"},
-                                {SiteKind::kArmature, "armature", "armature"},
-                                {SiteKind::kEffort, "effort", "effort limit"},
-                                {SiteKind::kVelocity, "velocity", "velocity limit"},
-                                {SiteKind::kStiffness, "stiffness", "stiffness"},
+                                {SiteKind::kDamping, "damping", "damping", kForces},
+                                {SiteKind::kFriction, "friction", "friction", kForces},
+                                {SiteKind::kArmature, "armature", "armature", kArmatures},
+                                {SiteKind::kEffort, "effort", "effort limit", kForces},
+                                {SiteKind::kVelocity, "velocity", "velocity limit", kForces},
+                                {SiteKind::kStiffness, "stiffness", "stiffness", kForces},
                                 {SiteKind::kSpringAngle, "spring_reference", "spring's angle"},
-                                {SiteKind::kGear, "gear", "motor's gear"},
-                                {SiteKind::kMass, "mass", "mass"},
-                                {SiteKind::kCom, "com", "centre of mass"},
-                                {SiteKind::kInertia, "inertia", "inertia"},
-                                {SiteKind::kGravity, "gravity", "gravity"},
+                                {SiteKind::kGear, "gear", "motor's gear", kSignOnly},
+                                {SiteKind::kMass, "mass", "mass", kMasses},
+                                {SiteKind::kCom, "com", "centre of mass", kLengths},
+                                {SiteKind::kInertia, "inertia", "inertia", kInertias},
+                                {SiteKind::kGravity, "gravity", "gravity", kGravities},
                                 {SiteKind::kConstraint, "constraint", "constraint"},
                                 {SiteKind::kMotor, "motor", "motor"}};
+
+const SiteWords& FindSite(SiteKind kind) { return *std::ranges::find(kSites, kind, &SiteWords::kind); }
 
 /// A kind in a name and in words; "{}" stands for its component.
 struct KindWords {
@@ -219,7 +222,7 @@ std::string DescribeKind(const FileFault& fault) {
 std::string NameQuantity(const FileFault& fault) {
   if (fault.whole && fault.kind == Kind::kUnit) return "lengths";
   if (fault.whole) return IsOfBody(fault.of) ? "body" : "place";
-  return std::ranges::find(kSites, fault.of, &SiteWords::kind)->id;
+  return FindSite(fault.of).id;
 }
 
 }  // namespace
@@ -235,7 +238,7 @@ std::string NamePlace(const PrintedLink& link, SiteKind kind) {
   return "joint " + link.joint.name;
 }
 
-const char* NameSite(SiteKind kind) { return std::ranges::find(kSites, kind, &SiteWords::kind)->words; }
+const char* NameSite(SiteKind kind) { return FindSite(kind).words; }
 
 std::string DescribeFault(const FileFault& fault) {
   std::string what = NameSite(fault.of);
@@ -278,33 +281,7 @@ std::string NameFault(const FileFault& fault) {
   return (fault.kind >= Kind::kClassicRows ? "table" : quantity) + "." + id;
 }
 
-std::span<const UnitFault> ListUnits(SiteKind kind) {
-  switch (kind) {
-    case SiteKind::kPosition:
-    case SiteKind::kCom:
-      return kLengths;
-    case SiteKind::kMass:
-      return kMasses;
-    case SiteKind::kInertia:
-      return kInertias;
-    case SiteKind::kRange:
-      return kRanges;
-    case SiteKind::kDamping:
-    case SiteKind::kFriction:
-    case SiteKind::kStiffness:
-    case SiteKind::kEffort:
-    case SiteKind::kVelocity:
-      return kForces;
-    case SiteKind::kArmature:
-      return kArmatures;
-    case SiteKind::kGear:
-      return kSignOnly;
-    case SiteKind::kGravity:
-      return kGravities;
-    default:
-      return {};
-  }
-}
+std::span<const UnitFault> ListUnits(SiteKind kind) { return FindSite(kind).units; }
 
 double CountBits(double value, double half) {
   constexpr double kZero = 5.0;

@@ -166,19 +166,9 @@ class PrintedMjcfReader {
     PrintedJoint joint;
     const auto find = [&](const char* name) { return FindText(element, around, name); };
     joint.name = NameOf(engine_, mjOBJ_JOINT, id);
-    switch (engine_.jnt_type[id]) {
-      case mjJNT_FREE:
-        joint.kind = JointKind::kFree;
-        return joint;
-      case mjJNT_BALL:
-        joint.kind = JointKind::kBall;
-        break;
-      case mjJNT_SLIDE:
-        joint.kind = JointKind::kSlide;
-        break;
-      default:
-        joint.kind = JointKind::kHinge;
-    }
+    constexpr JointKind kKinds[] = {JointKind::kFree, JointKind::kBall, JointKind::kSlide, JointKind::kHinge};
+    joint.kind = kKinds[engine_.jnt_type[id]];
+    if (joint.kind == JointKind::kFree) return joint;
     const std::string axis = find("axis");
     std::tie(joint.axis, joint.half_axis) = ReadPrintedVector<3>(axis.empty() ? "0 0 1" : axis);
     joint.anchor = MapVector(engine_.jnt_pos + 3 * id);

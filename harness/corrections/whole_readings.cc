@@ -45,12 +45,8 @@ PrintedRobot TakeTwists(const PrintedRobot& robot, const FindSource& find) {
 }
 
 /// In a classic row alpha and a stand behind the joint: they are the next row's, and bodies, frames and what
-/// else hangs on the link are given behind them.
-PrintedRobot ReadClassic(const PrintedRobot& robot) {
-  PrintedRobot read = TakeTwists(robot, [&](int i) {
-    const int parent = robot.link(i).parent;
-    return parent >= 0 && IsRow(robot.link(parent)) ? parent : -1;
-  });
+/// else hangs on the link are given behind them. @param read has the alpha and a of the rows before.
+PrintedRobot ReadClassic(const PrintedRobot& robot, PrintedRobot read) {
   for (int i = 0; i < robot.size(); ++i) {
     if (!IsRow(robot.link(i))) continue;
     const Pose X = CalcTwist(robot.link(i).origin);
@@ -106,7 +102,7 @@ std::vector<WholeReading> ListWholeReadings(const PrintedRobot& robot) {
       const auto row = std::ranges::find_if(children, [&](int k) { return IsRow(robot.link(k)); });
       return row == children.end() ? -1 : *row;
     };
-    readings.push_back({{CorrectionKind::kClassicRows}, ReadClassic(robot)});
+    readings.push_back({{CorrectionKind::kClassicRows}, ReadClassic(robot, TakeTwists(robot, before))});
     readings.push_back({{CorrectionKind::kShiftedRows, SiteKind::kPosition, 0}, TakeTwists(robot, behind)});
     readings.push_back({{CorrectionKind::kShiftedRows, SiteKind::kPosition, 1}, TakeTwists(robot, before)});
   }

@@ -5,21 +5,11 @@
 namespace dexcheck {
 
 bool MechanismProvider::HasValue(Term term) const {
-  switch (term) {
-    case Term::kMHat:
-    case Term::kCHatV:
-    case Term::kNo:
-    case Term::kObjectKineticEnergy:
-    case Term::kObjectPotentialEnergy:
-      return has_object_;
-    case Term::kObjectPose:
-    case Term::kVBo:
-    case Term::kMo:
-    case Term::kCoXoDot:
-      return has_object_ && has_coordinates_;
-    default:
-      return term < Term::kContactFrame || !contacts_.empty();
-  }
+  if (term < Term::kContactFrame) return true;
+  if (term < Term::kObjectPose) return !contacts_.empty();
+  constexpr Term kByCoordinates[] = {Term::kObjectPose, Term::kVBo, Term::kMo, Term::kCoXoDot};
+  const bool needs_coordinates = std::ranges::find(kByCoordinates, term) != std::end(kByCoordinates);
+  return has_object_ && (has_coordinates_ || !needs_coordinates);
 }
 
 void MechanismProvider::ReadValues(Term term, Eigen::Ref<MatrixXd> out) const {

@@ -123,6 +123,7 @@ void EngineProvider::ReadJacobians(Eigen::Ref<MatrixXd> out) const {
 }
 
 void EngineProvider::Read(Term term, Eigen::Ref<MatrixXd> out) {
+  const auto put = [&](const auto& values) { out = values; };
   switch (term) {
     case Term::kJointAxis:
       for (int i = 0; i < static_cast<int>(out.cols()); ++i) {
@@ -153,25 +154,19 @@ void EngineProvider::Read(Term term, Eigen::Ref<MatrixXd> out) {
       }
       return;
     case Term::kM:
-      out = unreduced_->M();
-      return;
+      return put(unreduced_->M());
     case Term::kMBar:
-      out = M();
-      return;
+      return put(M());
     case Term::kCBarXi:
-      out = terms_.coriolis();
-      return;
+      return put(terms_.coriolis());
     case Term::kCBarProduct:
       return terms_.CalcCoriolisProduct(xi_, w_, out.col(0));
     case Term::kGravity:
-      out = terms_.gravity();
-      return;
+      return put(terms_.gravity());
     case Term::kBias:
-      out = terms_.coriolis() + terms_.gravity();
-      return;
+      return put(terms_.coriolis() + terms_.gravity());
     case Term::kFriction:
-      out = terms_.friction();
-      return;
+      return put(terms_.friction());
     default:
       ReadValues(term, out);
   }
