@@ -45,15 +45,23 @@ Vector3d EngineTerms::JointAnchor(int joint) const {
 }
 
 std::vector<MassProperties> EngineTerms::links() const {
+  const mjModel* m = engine_.get();
+  const mjData* d = data_.get();
   std::vector<MassProperties> links;
   for (const std::vector<int>& welded : adapter_->welded_bodies()) {
-    std::vector<MassProperties> bodies;
+    MassProperties& link = links.emplace_back();
     for (const int body : welded) {
-      const RotationMap R(data_->ximat + 9 * body);
-      bodies.push_back({engine_->body_mass[body], MapVector(data_->xipos + 3 * body),
-                        R * MapVector(engine_->body_inertia + 3 * body).asDiagonal() * R.transpose()});
+      link.mass += m->body_mass[body];
+      link.com += m->body_mass[body] * MapVector(d->xipos + 3 * body);
     }
-    links.push_back(Combine(bodies));
+    if (link.mass > 0.0) link.com /= link.mass;
+    for (const int body : welded) {
+      const RotationMap R(d->ximat + 9 * body);
+      const Vector3d arm = MapVector(d->xipos + 3 * body) - link.com;
+      // The parallel-axis theorem adds m (|r|^2 1 - r r^T).
+      link.inertia += R * MapVector(m->body_inertia + 3 * body).asDiagonal() * R.transpose() +
+                      m->body_mass[body] * (arm.squaredNorm() * Matrix3d::Identity() - arm * arm.transpose());
+    }
   }
   return links;
 }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "controller/dynamics/term_types.h"
-#include "controller/model/rigid_body.h"
+#include "controller/model/robot_model.h"
 #include "harness/engine/engine.h"
 #include "harness/engine/velocity_map.h"
 
@@ -151,7 +151,7 @@ class EngineTerms {
   VectorXd q_;
 
   MatrixXd M_;
-  MatrixXd mass_nv_;  // scratch: of all the engine's dofs
+  MatrixXd mass_nv_;  // scratch of all the engine's dofs
   VectorXd force_nv_, bracket_nv_;
   VectorXd coriolis_, gravity_, friction_;
   VectorXd other_velocity_, other_force_;  // scratch of CalcCoriolisProduct
