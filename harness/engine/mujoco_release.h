@@ -245,15 +245,21 @@ inline const mjtNum* GetMassEntries(const mjData& d) {
 #endif
 }
 
-/// Change of an entry's address from a dof to the one that it hangs on, in the row of one dof.
-inline constexpr int kTowardRoot = mjVERSION_HEADER >= 3011000 ? -1 : 1;
-
 /// Returns the address of a dof's entry with the one `steps` toward the root; -1 when it is always zero.
 inline int FindMassEntry(const mjModel& m, int dof, int steps) {
 #if mjVERSION_HEADER >= 3011000
   return steps < m.M_rownnz[dof] ? m.M_rowadr[dof] + m.M_rownnz[dof] - 1 - steps : -1;
 #else
   return m.dof_Madr[dof] + steps;
+#endif
+}
+
+/// The whole mass matrix, nv x nv.
+inline void ExpandMass(const mjModel& m, const mjData& d, mjtNum* M) {
+#if mjVERSION_HEADER >= 3010000
+  mj_fullM(&m, &d, M);
+#else
+  mj_fullM(&m, M, d.qM);
 #endif
 }
 

@@ -8,7 +8,6 @@
 #include "harness/engine/engine.h"
 #include "harness/engine/mujoco_release.h"
 #include "harness/engine/velocity_map.h"
-#include "tests/common/engine_mass.h"
 #include "tests/common/paths.h"
 #include "tests/common/random_robot.h"
 

@@ -18,7 +18,7 @@
 #include "harness/comparison/consistency.h"
 #include "harness/comparison/engine_constants.h"
 #include "harness/engine/engine.h"
-#include "tests/common/engine_mass.h"
+#include "harness/engine/mujoco_release.h"
 #include "tests/common/files.h"
 #include "tests/common/matchers.h"
 #include "tests/common/paper_robot.h"

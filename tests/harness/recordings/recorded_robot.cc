@@ -6,8 +6,8 @@
 #include <fstream>
 #include <limits>
 
+#include "harness/engine/mujoco_release.h"
 #include "harness/recordings/column_names.h"
-#include "tests/common/engine_mass.h"
 #include "tests/common/paths.h"
 
 namespace dexcheck::testing {
