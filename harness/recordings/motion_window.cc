@@ -417,7 +417,7 @@ void MotionFit::ChooseWindow(const std::vector<size_t>& all) {
     const std::vector<size_t> centres = ListCentres(half);
     if (2 * half + 1 > rows_ahead_.size() / 4 || centres.size() < all.size() / 2) break;
     const Eigen::Index n = model_->num_joints();
-    // Of accelerations, and of velocities.
+    // The columns are accelerations and velocities.
     MatrixXd variance = MatrixXd::Zero(n, 2), bias = variance;
     double value = 0.0, rate = 0.0;
     for (const size_t centre : centres) {
