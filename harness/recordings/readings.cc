@@ -217,7 +217,9 @@ class Readings {
       constexpr double kMore = 1.2;  // than where the causes were found
       return one.held_left > std::max(kMostNoise * one.noise, kMore * one.left);
     };
-    if (!goes_on_ || std::ranges::none_of(reading->judgement.balances, happened) || !Reopen({})) return;
+    if (!goes_on_ || reading->judgement.left > kMostNoise ||
+        std::ranges::none_of(reading->judgement.balances, happened) || !Reopen({}))
+      return;
     Refinements others = refinements_;
     others.held_stretch = 1;
     TriedReading again{Judge({}, others)};
