@@ -29,7 +29,7 @@ Causes ExplainForces(const StepStore& store);
 struct SearchOptions {
   /// Processor time that the search for causes may take, s: what was found until then stands. Most faults
   /// take tenths of a second, some minutes.
-  double seconds = 2.0;
+  double seconds = 3.0;
   /// Whether terms of the model differ from the engine's at one and the same state.
   bool model_fails = false;
 };

@@ -61,10 +61,12 @@ inline bool CollidesByType(const mjModel& m) {
 inline bool CollidesByPair(const mjModel& /*m*/) { return true; }
 /// The option's value, and the setting of "all", which is fixed where there is no such option.
 inline int GetCollisionOption(const mjModel& /*m*/) { return 0; }
+inline void LetBothCollide(mjModel* /*m*/) {}
 #else
 inline bool CollidesByType(const mjModel& m) { return m.opt.collision != mjCOL_PAIR; }
 inline bool CollidesByPair(const mjModel& m) { return m.opt.collision != mjCOL_DYNAMIC; }
 inline int GetCollisionOption(const mjModel& m) { return m.opt.collision; }
+inline void LetBothCollide(mjModel* m) { m->opt.collision = mjCOL_ALL; }
 #endif
 
 /// Member that says of each equality constraint whether it is active when a run starts.

@@ -7,6 +7,7 @@
 #include <memory>
 #include <tuple>
 
+#include "harness/engine/mujoco_release.h"
 #include "tests/common/matchers.h"
 #include "tests/common/refused_text.h"
 #include "tests/harness/run/shipped_run.h"
@@ -22,9 +23,7 @@ enum class Masks { kNone, kShape, kLooks };
 /// Lets a geom and the palm's box, which are what stands for their bodies, or the palm's shell, which is only
 /// seen, collide by their masks, and no others.
 void CollideByMasks(int top, Masks masks, mjModel* m) {
-#if mjVERSION_HEADER < 300
-  m->opt.collision = mjCOL_ALL;
-#endif
+  LetBothCollide(m);
   const Solids solids = ListSolids(*m);
   const int palm = mj_name2id(m, mjOBJ_BODY, "r_palm");
   for (int geom = 0; geom < m->ngeom; ++geom) {
