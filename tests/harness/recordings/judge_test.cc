@@ -133,40 +133,6 @@ TEST(Judge, PositionsInDegreesAreSaid) {
   EXPECT_TRUE(NamesOnly(Judge(table), "unit of the positions", "all joints", 180.0 / kPi));
 }
 
-// A drive's filter leaves noise that is similar in rows that follow each other: it is no residual of the
-// model.
-TEST(Judge, FilteredTorquesOfARightModelAreExplained) {
-  const RecordedFault filter = {.record = [](RecordedTable* table) {
-    constexpr size_t kRows = 4;  // to each side, so that nothing is late
-    for (const std::string& name : table->names) {
-      if (!name.starts_with("tau.")) continue;
-      const std::vector<double> raw = table->Get(name);
-      for (size_t i = kRows; i + kRows < raw.size(); ++i) {
-        double sum = 0.0;
-        for (size_t k = i - kRows; k <= i + kRows; ++k) sum += raw[k];
-        table->Get(name)[i] = sum / (2 * kRows + 1);
-      }
-    }
-  }};
-  for (const bool has_velocities : {false, true}) {
-    const RecordingJudgement judgement = Judge(Record({filter}, has_velocities));
-    EXPECT_TRUE(judgement.Agrees()) << has_velocities << Tell(judgement);
-  }
-}
-
-// One of four such times is held out from the search for causes.
-TEST(Judge, AShortTorqueIsNeverExplained) {
-  for (const double begin : {6.0, 6.25, 6.5, 6.75}) {
-    const RecordedFault knock = {.record = [=](RecordedTable* table) {
-      for (size_t i = 0; i < table->rows(); ++i)
-        if (const double t = table->columns[0][i]; t >= begin && t < begin + 0.25)
-          table->Get("tau.panda_joint7")[i] += 0.5;
-    }};
-    const RecordingJudgement judgement = Judge(Record({knock}));
-    EXPECT_FALSE(judgement.Agrees()) << begin << Tell(judgement);
-  }
-}
-
 TEST(Judge, TorquesThatWereCutOffAreNamed) {
   // Noise comes after the cut of what is recorded, so that the largest number is not the limit. A motor that
   // gives less is one about a vertical axis: gravity would make the arm fall.
