@@ -8,7 +8,7 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 export CMAKE_BUILD_PARALLEL_LEVEL=${CMAKE_BUILD_PARALLEL_LEVEL:-$(nproc)}
 
 purpose=tests
-[[ ${1:-} != sanitize && ${1:-} != thread ]] || purpose=development
+[[ ${1:-} != sanitize ]] || purpose=development
 "$root/harness/install-packages.sh" "$purpose"
 cd "$root"
 preset=${1:-release}

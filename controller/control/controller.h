@@ -71,8 +71,7 @@ class Controller {
   /// Whether the controller has nothing left to do.
   [[nodiscard]] virtual bool is_done() const { return false; }
 
-  /// The model as the controller evaluated it at its last Step, for whoever checks it. One that is at two
-  /// places by turns (AlternatingModel) is read during the next Step, too.
+  /// The model as the controller evaluated it at its last Step, for whoever checks it; at a fixed address.
   [[nodiscard]] virtual const GraspModel& model() const = 0;
 
  protected:

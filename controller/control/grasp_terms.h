@@ -4,7 +4,6 @@
 // along rolling contacts, and the object's terms. Fingers of one hand or of both, one hard-finger contact
 // each; n entries of xi, k = 3N of f_c = [f_c1; ..; f_cN].
 
-#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -200,9 +199,6 @@ class GraspModel {
   /// Evaluates all terms at a state. @throws what GraspTerms and CalcP throw.
   void SetState(const MeasuredState& state);
 
-  /// The angles' branch is the one nearest to that of `other` at the next state.
-  void Follow(const GraspModel& other) { X_o_ = other.X_o_; }
-
   [[nodiscard]] const ModelTerms& robot() const { return robot_; }
   [[nodiscard]] const GraspTerms& grasp() const { return grasp_; }
   /// Whether X_o and the terms in it are evaluated.
@@ -213,26 +209,6 @@ class GraspModel {
   ModelTerms robot_;
   GraspTerms grasp_;
   Vector6d X_o_;  // of the last state, to stay on one branch of the angles
-};
-
-/// Two of them by turns: what was evaluated at one step can be read while the next one is evaluated.
-class AlternatingModel {
- public:
-  explicit AlternatingModel(const GraspModel& model) : models_{model, model} {}
-
-  /// Sets the state as GraspModel::SetState does; the model of the previous call is kept unchanged.
-  void SetState(const MeasuredState& state) {
-    const GraspModel& last = now();
-    now_ = 1 - now_;
-    models_[now_].Follow(last);
-    models_[now_].SetState(state);
-  }
-  /// The one that was evaluated last.
-  [[nodiscard]] const GraspModel& now() const { return models_[now_]; }
-
- private:
-  std::array<GraspModel, 2> models_;
-  size_t now_ = 0;
 };
 
 }  // namespace dexcheck

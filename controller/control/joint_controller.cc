@@ -69,7 +69,7 @@ const VectorXd& JointLaw::CalcTorque(const ModelTerms& robot, const Eigen::Ref<c
 JointController::JointController(const RobotModel& model, const MassProperties& object,
                                  const Surface& surface, ControlLaw law, const JointGains& gains,
                                  const JointMotion& motion, const Sampling& sampling)
-    : model_(GraspModel(model, {}, object, surface, {.orientation = OrientationFeedback::kRotation})),
+    : model_(model, {}, object, surface, {.orientation = OrientationFeedback::kRotation}),
       law_(model, law, gains),
       demand_(motion, sampling.time_step),
       sampling_(sampling) {

@@ -121,10 +121,10 @@ class JointController final : public Controller {
   void Follow(const Trajectory& motion) override;
   void Begin(double t, const Reading& reading) override;
   void Step(const Reading& reading, double t, Command* command) override;
-  [[nodiscard]] const GraspModel& model() const override { return model_.now(); }
+  [[nodiscard]] const GraspModel& model() const override { return model_; }
 
  private:
-  AlternatingModel model_;
+  GraspModel model_;
   JointLaw law_;
   JointDemand demand_;
   Sampling sampling_;

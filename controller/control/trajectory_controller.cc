@@ -37,7 +37,7 @@ GraspController::GraspController(const RobotModel& model, std::span<const int> f
                                  const MassProperties& object, const Surface& surface,
                                  const GraspControllerOptions& options)
     : options_(options),
-      model_(GraspModel(model, fingertips, object, surface, options)),
+      model_(model, fingertips, object, surface, options),
       law_(model, static_cast<int>(fingertips.size()), options.weight),
       force_(static_cast<int>(fingertips.size()), options) {
   sigma_prime_.setZero(model.num_velocities());

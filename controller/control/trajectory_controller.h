@@ -77,7 +77,7 @@ class GraspController {
   /// cones holds the object.
   const VectorXd& CalcTorque(const DesiredMotion& desired);
 
-  [[nodiscard]] const GraspModel& model() const { return model_.now(); }
+  [[nodiscard]] const GraspModel& model() const { return model_; }
   [[nodiscard]] const ModelTerms& robot() const { return model().robot(); }
   [[nodiscard]] const GraspTerms& grasp() const { return model().grasp(); }
   [[nodiscard]] const ComputedTorque& law() const { return law_; }
@@ -94,7 +94,7 @@ class GraspController {
 
  private:
   GraspControllerOptions options_;
-  AlternatingModel model_;
+  GraspModel model_;
   ComputedTorque law_;
   std::optional<BaselineLaw> baseline_;  // none for computed torque
   GraspForceStage force_;

@@ -11,7 +11,7 @@ PickAndPlaceController::PickAndPlaceController(const RobotModel& model, const Ha
                                                const GraspControllerOptions& options, const VectorXd& q_start,
                                                const PickAndPlaceOptions& task, double time_step)
     : options_(options),
-      model_(GraspModel(model, hand.fingertips, object, surface, options)),
+      model_(model, hand.fingertips, object, surface, options),
       law_(model, hand.fingertips, object, surface, options),
       task_(model, hand, surface, object, q_start, task, time_step) {
   Require(options.orientation == OrientationFeedback::kRotation, "orientation", "must be kRotation",

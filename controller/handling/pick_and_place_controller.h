@@ -22,7 +22,7 @@ class PickAndPlaceController final : public Controller {
   void Begin(double t, const Reading& reading) override;
   void Step(const Reading& reading, double t, Command* command) override;
   [[nodiscard]] bool is_done() const override { return task_.is_done(); }
-  [[nodiscard]] const GraspModel& model() const override { return model_.now(); }
+  [[nodiscard]] const GraspModel& model() const override { return model_; }
 
   [[nodiscard]] const PickAndPlace& task() const { return task_; }
   /// Largest change of a torque from one step to the next where the phase or the contacts changed, N m.
@@ -33,7 +33,7 @@ class PickAndPlaceController final : public Controller {
   void Describe(Command* command) const;
 
   GraspControllerOptions options_;
-  AlternatingModel model_;
+  GraspModel model_;
   HandlingController law_;
   PickAndPlace task_;
   bool begun_ = false;

@@ -1,11 +1,9 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <exception>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "controller/common/errors.h"
@@ -32,7 +30,6 @@ struct RunRequest : Outputs {
   Overrides overrides;
   ToleranceOptions judging;
   std::uint64_t seed = 0;
-  int threads = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 2U));
   bool no_check = false;
   bool no_log = false;
   bool no_report = false;
@@ -69,12 +66,6 @@ void DrawRun(const RunRequest& request, const std::filesystem::path& folder, Exi
   });
 }
 
-LoopParts MakeParts(const RunRequest& request, const Setup& setup) {
-  LoopParts parts = MakeLoopParts(setup);
-  parts.threads = request.threads;
-  return parts;
-}
-
 /// Judges the two files of joints as consistency does: numbers that agree within their printed digits are
 /// judged by these. @return what differs; empty where the files agree, or where the scenario changes or
 /// leaves out one of them.
@@ -106,7 +97,7 @@ int RunScenario(const RunRequest& request) {
   ReportOutput output(request);
   const Setup setup(files.scenario, files.robot, files.mjcf);
   CatchInterrupts();
-  Runner runner(setup, !request.no_check, MakeParts(request, setup));
+  Runner runner(setup, !request.no_check);
   std::filesystem::path folder;  // none without a log
   if (!request.no_log) folder = MakeRunFolder(request.out, setup.scenario().name);
   std::optional<RunRecorder> recorder;
@@ -174,7 +165,7 @@ int ReplayRun(const RunRequest& request) {
   const Setup setup(recorded.files().scenario, recorded.files().robot, recorded.files().mjcf);
   WarnOfController(recorded.log(), setup.scenario().controller);
   CatchInterrupts();
-  Runner runner(setup, recorded.was_checked(), MakeParts(request, setup));
+  Runner runner(setup, recorded.was_checked());
   const TemporaryFolder scratch;
   const std::filesystem::path log = scratch.path() / "log.h5";
   RunRecorder recorder(log, runner.loop(), setup,
@@ -259,9 +250,6 @@ void AddRunCommand(CLI::App* app, const std::string& command_line) {
   const auto [set, unset, controller] = AddOverrideOptions(command, &request->overrides);
   const std::array<CLI::Option*, 2> judging = AddToleranceOptions(command, &request->judging);
   CLI::Option* const seed = AddSeedOption(command, &request->seed);
-  AddOption(command, "--threads N", &request->threads,
-            "2 (where there are two processors): checks have a thread of their own; the numbers are the same")
-      ->check(WholeNumber(1, 2));
   CLI::Option* const no_check =
       command->add_flag("--no-check", request->no_check, "Simulate without cross-checks");
   CLI::Option* const video =

@@ -4,8 +4,8 @@
 
 namespace dexcheck {
 
-/// While one exists, searches for causes in its thread end after so much processor time, and when the user
-/// interrupts: what was found until then stands.
+/// While one exists, searches for causes end after so much processor time, and when the user interrupts: what
+/// was found until then stands.
 class SearchLimit {
  public:
   /// @param seconds of processor time.
@@ -14,13 +14,13 @@ class SearchLimit {
   SearchLimit(const SearchLimit&) = delete;
   SearchLimit& operator=(const SearchLimit&) = delete;
 
-  /// Whether this thread's searches are to end now; without a limit never.
+  /// Whether searches are to end now; without a limit never.
   static bool IsOver();
   /// Whether this one has ended a search.
   [[nodiscard]] bool has_ended() const { return has_ended_; }
 
  private:
-  double end_;  // of the thread's processor time, s
+  double end_;  // of the process's processor time, s
   bool was_interrupted_;
   bool has_ended_ = false;
 };

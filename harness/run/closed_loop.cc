@@ -10,67 +10,6 @@
 
 namespace dexcheck {
 
-StepChecker::StepChecker(const StepRecord& like, std::function<void(StepRecord*)> check)
-    : check_(std::move(check)), step_(like), model_(*like.model), thread_([this] { Run(); }) {}
-
-StepChecker::~StepChecker() {
-  AwaitChange(kWorking);
-  Set(kQuit);
-  thread_.join();
-}
-
-void StepChecker::Start(const StepRecord& step) {
-  step_ = step;
-  const bool stays = step.model != last_ && step.model == before_last_;
-  before_last_ = std::exchange(last_, step.model);
-  if (!stays) {
-    model_ = *step.model;
-    step_.model = &model_;
-  }
-  is_pending_ = true;
-  Set(kWorking);
-}
-
-void StepChecker::Await() {
-  is_pending_ = false;
-  AwaitChange(kWorking);
-  if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
-}
-
-void StepChecker::AwaitChange(State from) const {
-  // Sleeping and waking takes longer than a step: the thread spins for some of them, and yields its core.
-  constexpr int kSpins = 5000, kAlone = 200;
-  for (int i = 0; i < kSpins; ++i) {
-    if (state_.load(std::memory_order_acquire) != from) return;
-    if (i >= kAlone) {
-      std::this_thread::yield();
-    } else {
-#ifdef __x86_64__
-      __builtin_ia32_pause();  // lets the other thread of the core go first
-#endif
-    }
-  }
-  state_.wait(from, std::memory_order_acquire);
-}
-
-void StepChecker::Set(State state) {
-  state_.store(state, std::memory_order_release);
-  state_.notify_one();
-}
-
-void StepChecker::Run() {
-  while (true) {
-    AwaitChange(kIdle);
-    if (state_.load(std::memory_order_acquire) == kQuit) return;
-    try {
-      check_(&step_);
-    } catch (...) {
-      failure_ = std::current_exception();
-    }
-    Set(kIdle);
-  }
-}
-
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -112,7 +51,6 @@ ClosedLoop::ClosedLoop(const Setup& setup, bool check, LoopParts parts)
   record_.command.tau.setZero(setup.model().num_velocities());
   record_.reading.qvel.setZero(setup.engine().nv);
   trajectory_ = setup.MakeTrajectory();
-  if (check && parts.threads > 1) checker_.emplace(record_, [this](StepRecord* step) { Judge(step); });
   if (!trajectory_) return;
   if (scenario.start == Start::kMoving) CheckMovingStart();
 }
@@ -246,7 +184,6 @@ void ClosedLoop::DriveMotors(double t) {
   try {
     drive_.Apply(record_.command.tau, record_.reading.state.xi, &record_.drive);
   } catch (const RunFailure&) {
-    Finish();
     if (checks_) checks_->JudgeEffort(record_, t);
     // Torques that are too large may be those of no law, or motors and sensors may be at fault.
     if (checks_) {
@@ -265,67 +202,42 @@ void ClosedLoop::MakeStep(double t) {
   try {
     ControlStep(t);
   } catch (...) {
-    Finish();
     if (checks_ && is_driven_) checks_->JudgeEffort(record_, t);
-    if (record_.step > 0 && !has_failed_) Observe(record_);
+    if (record_.step > 0) Observe();
     throw;
   }
-}
-
-void ClosedLoop::Judge(StepRecord* step) {
-  const auto begin = Clock::now();
-  checks_->JudgeEffort(*step, step->time);
-  checks_->Follow(*step);
-  checks_->JudgeModel(*step);
-  checks_->JudgeStep(*step);
-  step->findings = checks_->analysis().findings;
-  store_->Add(*step, checks_->analysis(), checks_->differs());
-  times_.cross_check += Seconds(begin, Clock::now());
 }
 
 void ClosedLoop::Check() {
-  try {
-    if (checks_) Judge(&record_);
-  } catch (...) {
-    Observe(record_);
-    throw;
-  }
-  Observe(record_);
+  const auto begin = Clock::now();
+  checks_->JudgeEffort(record_, record_.time);
+  checks_->Follow(record_);
+  checks_->JudgeModel(record_);
+  checks_->JudgeStep(record_);
+  record_.findings = checks_->analysis().findings;
+  store_->Add(record_, checks_->analysis(), checks_->differs());
+  times_.cross_check += Seconds(begin, Clock::now());
 }
 
-void ClosedLoop::Observe(const StepRecord& step) const {
-  if (observe_) observe_(step);
-}
-
-void ClosedLoop::Finish() {
-  if (!checker_ || !checker_->is_pending()) return;
-  try {
-    checker_->Await();
-  } catch (...) {
-    record_ = checker_->step();  // nothing came after it
-    has_failed_ = true;
-    Observe(record_);
-    throw;
-  }
-  record_.findings = checker_->step().findings;
-  Observe(checker_->step());
+void ClosedLoop::Observe() const {
+  if (observe_) observe_(record_);
 }
 
 void ClosedLoop::Step() {
   record_.time = time();
-  const bool beside = checker_ && choice_.Next(Seconds(Clock::time_point{}, Clock::now()));
   MakeStep(record_.time);
   record_.error = CalcTrackingError(record_);
   if (follower_ != nullptr) record_.followed_kappa = follower_->followed_kappa();
   CalcContactDrifts(record_, &record_.drift);
   for (const ContactDrift& drift : record_.drift) largest_drift_.Raise(drift);
   ++record_.step;
-  Finish();
-  if (beside) {
-    checker_->Start(record_);
-  } else {
-    Check();
+  try {
+    if (checks_) Check();
+  } catch (...) {
+    Observe();
+    throw;
   }
+  Observe();
   CheckGrasp();
   if (task_ != nullptr) CheckTask();
 }

@@ -2,12 +2,9 @@
 
 // The loop of plant and controller, cross-checked at every step.
 
-#include <atomic>
-#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "controller/control/controller.h"
@@ -23,67 +20,6 @@
 #include "harness/scenario/setup.h"
 
 namespace dexcheck {
-
-/// Makes the checks of one step at a time in a thread of its own, on a copy of its record (and of the
-/// controller's model, unless the controller alternates between two models), so that the next step can go on.
-class StepChecker {
- public:
-  /// @param like a record whose model has the form of the copies. @param check makes the checks of a copy.
-  StepChecker(const StepRecord& like, std::function<void(StepRecord*)> check);
-  ~StepChecker();
-  StepChecker(const StepChecker&) = delete;
-  StepChecker& operator=(const StepChecker&) = delete;
-
-  /// Begins with a step. Await must come before the next.
-  void Start(const StepRecord& step);
-  /// Waits until the checks are made. @throws their exceptions.
-  void Await();
-  /// Whether Await has not been called since Start.
-  [[nodiscard]] bool is_pending() const { return is_pending_; }
-  /// The copy, with the results of the checks.
-  [[nodiscard]] const StepRecord& step() const { return step_; }
-
- private:
-  enum State : int { kIdle, kWorking, kQuit };
-  /// Waits until the state changes: a millisecond or so awake, then asleep.
-  void AwaitChange(State from) const;
-  void Set(State state);
-  void Run();
-
-  std::function<void(StepRecord*)> check_;
-  StepRecord step_;
-  GraspModel model_;  // a copy of one that the next step overwrites
-  const GraspModel* last_ = nullptr;
-  const GraspModel* before_last_ = nullptr;
-  bool is_pending_ = false;
-  std::exception_ptr failure_;
-  std::atomic<State> state_ = kIdle;
-  std::thread thread_;
-};
-
-/// Chooses whether checks have a thread of their own, by which way was faster lately: on a machine that is
-/// busy with other work two threads wait for each other longer than one takes. Steps come in blocks; one
-/// block tries the thread, one goes without it, and those that follow use the faster way.
-class ThreadChoice {
- public:
-  static constexpr long kBlock = 32, kBlocks = 64;
-
-  /// Whether the next step's checks are made beside the step after it. @param now s, before the step.
-  [[nodiscard]] bool Next(double now) {
-    const long step = steps_++;
-    if (step % kBlock != 0) return is_beside_;
-    (is_beside_ ? beside_ : alone_) = now - begin_;
-    begin_ = now;
-    const long block = step / kBlock % kBlocks;
-    is_beside_ = block == 0 || (block > 1 && beside_ < alone_);
-    return is_beside_;
-  }
-
- private:
-  long steps_ = 0;
-  bool is_beside_ = false;
-  double begin_ = 0.0, beside_ = 0.0, alone_ = 0.0;  // s; the last block of each kind took
-};
 
 /// A fingertip left the object.
 class GraspLost : public RunFailure {
@@ -105,9 +41,7 @@ struct LoopTimes {
 ///   plant --PlantReading--> sensing --Reading--> controller --Command--> motors --tau'--> plant <-- pushes
 ///     `----PlantResponse----> checks: all of it is one StepRecord
 ///
-/// Deterministic: with two threads the checks of a step are made beside the whole next step, on a copy of its
-/// record, as long as that is faster (ThreadChoice), and every number is the same. Nothing allocates in a
-/// step, except in the controller and RunChecks as they state.
+/// Deterministic. Nothing allocates in a step, except in the controller and RunChecks as they state.
 class ClosedLoop {
  public:
   /// @param check whether to cross-check.
@@ -122,14 +56,11 @@ class ClosedLoop {
   /// @return whether everything came to rest; false when it was stopped before. @throws as Step.
   bool Settle(const std::function<bool()>& should_stop = [] { return false; });
 
-  /// Sets the function that gets each step once its checks are made, in order, including one that fails after
-  /// the first; with two threads a step later than it was made.
+  /// Sets the function that gets each step once its checks are made, also one that fails after the first.
   void SetObserver(std::function<void(const StepRecord&)> observe) { observe_ = std::move(observe); }
   /// Makes one step. @throws RunFailure, DivergenceError, GraspForceError, SingularityError. The values of
   /// the step up to then can be read.
   void Step();
-  /// Waits for the checks of the last step. @throws as Step.
-  void Finish();
 
   /// The last step, at a fixed address. Its findings come with its checks.
   [[nodiscard]] const StepRecord& record() const { return record_; }
@@ -169,11 +100,9 @@ class ClosedLoop {
   void MakeStep(double t);
   /// Lets time begin anew for checks and causes.
   void ForgetSteps(RunChecks::Keep keep = RunChecks::Keep::kAll);
-  /// Makes the checks of the step in this thread.
-  void Check();
   /// Makes all checks of a step of the run.
-  void Judge(StepRecord* step);
-  void Observe(const StepRecord& step) const;
+  void Check();
+  void Observe() const;
   void ControlStep(double t);
   void DriveMotors(double t);
   void CheckRobot() const;
@@ -198,12 +127,9 @@ class ClosedLoop {
   long num_steps_ = 0;
   bool is_running_ = false;  // all has settled
   long steps_without_grasp_ = 0;
-  bool is_driven_ = false;   // whether the step's torques were sent
-  bool has_failed_ = false;  // the checker
+  bool is_driven_ = false;  // whether the step's torques were sent
   LoopTimes times_;
   ContactDrift largest_drift_;
-  std::optional<StepChecker> checker_;  // none with one thread
-  ThreadChoice choice_;
 };
 
 }  // namespace dexcheck

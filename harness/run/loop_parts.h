@@ -23,7 +23,6 @@ struct LoopParts {
   const PickAndPlaceController* task = nullptr;    ///< The controller, when it does a task.
   const TrajectoryController* follower = nullptr;  ///< The controller, when it follows its contacts by (40).
   bool knows_law = true;                           ///< Whether the controller's law is the scenario's.
-  int threads = 1;                                 ///< 2: checks have a thread of their own.
   SearchOptions search;                            ///< Options of the search for causes of failed checks.
   SensingOptions sensing;
   ActuationOptions actuation;

@@ -137,7 +137,6 @@ class Runner {
       }
       Guard([&] { loop_.Step(); }, /*settling=*/false);
     }
-    Guard([&] { loop_.Finish(); }, /*settling=*/false);
     result_.wall_seconds = SecondsSince(begin);
     Judge(*setup_, loop_, search_, &result_);
     return result_;

@@ -88,7 +88,6 @@ TEST(HiddenSensorFault, IsToldFromItsFirstStepToItsLast) {
   });
   loop.Settle();
   while (!loop.is_finished()) loop.Step();
-  loop.Finish();
   const Causes causes = ExplainSignals(loop.store());
   ASSERT_EQ(causes.size(), 2u);
   const Explanation& late = causes[1];
