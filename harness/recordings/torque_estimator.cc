@@ -292,8 +292,10 @@ VectorXd TorqueEstimator::FitAmplitudes(Part part, Index* rank) const {
   for (Index i = 0; i < CountForced(*recordings_); ++i) columns.push_back(i), plausible.push_back(1.0);
   for (size_t i = 0; i < faults_.size(); ++i) {
     const auto is_this = [i](const CauseTerm& term) { return term.candidate == i; };
+    // The times of a push are not exact where they are held out: by no numbers.
+    const bool takes_chosen = part == Part::kAll || faults_[i].kind == TorqueFault::kPush;
     const bool is_part =
-        IsPart(faults_[i], part) || (part == Part::kAll && std::ranges::any_of(selection_.terms, is_this));
+        IsPart(faults_[i], part) || (takes_chosen && std::ranges::any_of(selection_.terms, is_this));
     for (Index k = 0; k < CountColumns(faults_[i]) && is_part; ++k)
       columns.push_back(rows_.first[i] + k),
           plausible.push_back(faults_[i].scale.size() > 0 ? faults_[i].scale[k]

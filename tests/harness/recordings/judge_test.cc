@@ -133,6 +133,65 @@ TEST(Judge, PositionsInDegreesAreSaid) {
   EXPECT_TRUE(NamesOnly(Judge(table), "unit of the positions", "all joints", 180.0 / kPi));
 }
 
+// A drive's filter leaves noise that is similar in rows that follow each other: it is no residual of the
+// model.
+TEST(Judge, FilteredNoiseOfARightModelIsExplained) {
+  std::mt19937 random(3);
+  const RecordedFault filter = {.record = [&](RecordedTable* table) {
+    const double keeps = std::exp(-1.0 / 9.0);  // a first-order filter of nine rows
+    for (const std::string& name : table->names) {
+      if (!name.starts_with("tau.")) continue;
+      std::vector<double>& torques = table->Get(name);
+      const Eigen::Map<const VectorXd> all(torques.data(), static_cast<Eigen::Index>(torques.size()));
+      std::normal_distribution<double> normal(0.0, 0.1 * all.norm() / std::sqrt(all.size()));
+      double error = 0.0;
+      for (double& torque : torques) {
+        error = keeps * error + (1.0 - keeps) * normal(random);
+        torque += error;
+      }
+    }
+  }};
+  const RecordingJudgement judgement =
+      Judge(RecordRobot(kMjcf, {filter}, {.encoder_bits = 16, .torque_noise = 0.0}, &random));
+  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
+}
+
+// Velocities of coarse encoders are off by more than torques that are exact.
+TEST(Judge, DampingOfARightModelTimesAnErrorOfTheVelocityIsNoCause) {
+  constexpr double kDamping = 10.0;
+  RobotSpec spec = ReadDescription(SourcePath("/controller/parameters/panda.toml")).spec;
+  for (Joint& joint : spec.joints) joint.damping = kDamping;
+  const RobotModel model(spec);
+  const RecordedFault damped = {
+      .change = [=](mjModel* robot) { std::fill_n(robot->dof_damping, robot->nv, kDamping); }};
+  std::mt19937 random(3);
+  std::vector<Recording> recordings;
+  recordings.push_back(ToRecording(model, RecordRobot(kMjcf, {damped}, {.torque_noise = 0.0}, &random)));
+  const RecordingJudgement judgement = JudgeRecordings(model, &recordings, {});
+  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
+}
+
+// A quarter of the time is held out from the search: the torque, its beginning or its end may fall into it.
+TEST(Judge, ShortTorquesAreNamedWhereverTheyFall) {
+  for (const double begin : {15.5, 17.0})
+    for (const double size : {0.004, 0.012}) {
+      const RecordedFault knock = {.record = [=](RecordedTable* table) {
+        for (size_t i = 0; i < table->rows(); ++i)
+          if (const double t = table->columns[0][i]; t >= begin && t < begin + 0.3)
+            table->Get("tau.panda_joint7")[i] += size;
+      }};
+      std::mt19937 random(3);
+      const RecordingJudgement judgement = Judge(RecordRobot(kMjcf, {knock}, {.encoder_bits = 0}, &random));
+      ASSERT_EQ(judgement.causes.size(), 1U) << begin << Tell(judgement);
+      const Explanation& cause = judgement.causes[0];
+      EXPECT_EQ(cause.outcome, CauseOutcome::kNamed) << begin << Tell(judgement);
+      EXPECT_EQ(cause.faults[0].place + ": " + cause.faults[0].fault, "joint panda_joint7: torque");
+      EXPECT_NEAR(cause.faults[0].value, size, 0.15 * size) << begin;
+      EXPECT_NEAR(cause.from, begin, 0.15);
+      EXPECT_NEAR(cause.to, begin + 0.3, 0.15);
+    }
+}
+
 TEST(Judge, TorquesThatWereCutOffAreNamed) {
   // Noise comes after the cut of what is recorded, so that the largest number is not the limit. A motor that
   // gives less is one about a vertical axis: gravity would make the arm fall.
