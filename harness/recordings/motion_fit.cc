@@ -445,7 +445,7 @@ void MotionFit::Run(const Receiver& receive) {
 }
 
 std::vector<std::string> MotionFit::ListNotes() const {
-  std::vector<std::string> notes;
+  std::vector<std::string> notes = notes_;
   const auto note = [&](long count, const std::string& what) {
     if (count > 0) notes.push_back(fmt::format("{}: {} {}", recording_->name, count, what));
   };

@@ -179,6 +179,7 @@ class MotionFit {
   size_t part_;  // rows that are read at once
   std::vector<int> judged_;
   std::vector<Fault> faults_;
+  std::vector<std::string> notes_;  // of wrong samples
   bool has_currents_ = false;
   std::deque<Row> rows_ahead_;
   std::deque<long> segments_;  // of each row ahead

@@ -81,12 +81,20 @@ void MotionFit::ReplaceWrongSamples(size_t row) {
 }
 
 void MotionFit::ReportWrongSamples() {
-  constexpr double kFew = 0.002;  // of the rows: these are noise
+  constexpr double kFew = 0.002;        // of the rows: these are noise
+  constexpr double kFewTorques = 0.01;  // these say nothing of the robot, and are left out
   for (const auto& [place, count] : wrong_) {
-    const std::string quantity = place.second == RecordedQuantity::kPosition ? "position" : "torque";
-    if (const double share = static_cast<double>(count) / static_cast<double>(rows_); share > kFew)
-      faults_.push_back({"lost or wrong samples of the " + quantity,
-                         "joint " + model_->joint(place.first).name, 100.0 * share, 0.0, "%", "(not used)"});
+    const bool is_position = place.second == RecordedQuantity::kPosition;
+    const std::string quantity = is_position ? "position" : "torque";
+    const std::string& joint = model_->joint(place.first).name;
+    const double share = static_cast<double>(count) / static_cast<double>(rows_);
+    if (share > (is_position ? kFew : kFewTorques)) {
+      faults_.push_back({"lost or wrong samples of the " + quantity, "joint " + joint, 100.0 * share, 0.0,
+                         "%", "(not used)"});
+    } else if (share > kFew) {
+      notes_.push_back(fmt::format("{}: {} wrong samples of the torque of {} are left out", recording_->name,
+                                   count, joint));
+    }
   }
 }
 

@@ -120,6 +120,16 @@ TEST(Judge, JumpsAreNamedAndUndone) {
   EXPECT_TRUE(NamesOnly(Judge(lies), "lost or wrong samples of the position", "joint panda_joint2", 1.0));
 }
 
+TEST(Judge, FewWrongTorquesOfARightModelAreANote) {
+  RecordedTable table = Record({});
+  std::vector<double>& torque = table.Get("tau.panda_joint2");
+  for (size_t i = 50; i < torque.size(); i += 200) torque[i] += 20.0;
+  const RecordingJudgement judgement = Judge(table);
+  EXPECT_TRUE(judgement.Agrees()) << Tell(judgement);
+  EXPECT_THAT(judgement.notes, ::testing::Contains(::testing::HasSubstr(
+                                   "50 wrong samples of the torque of panda_joint2 are left out")));
+}
+
 TEST(Judge, VelocitiesOfAnotherSignAreSaidAndNotUsed) {
   RecordedTable table = Record({}, /*has_velocities=*/true);
   ScaleColumns("qd.panda_joint3", -1.0, &table);
