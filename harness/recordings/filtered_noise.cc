@@ -1,13 +1,19 @@
 #include "harness/recordings/filtered_noise.h"
 
+#include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+
+#include "harness/base/ranges.h"
 
 namespace dexcheck {
 namespace {
 
 using Eigen::Index;
+
+constexpr Index kMostOrder = 9;  // of the polynomials that follow all that a robot does
 
 /// Correlation of rows that are `lag` apart.
 using Correlation = double (*)(double lag, double length);
@@ -24,61 +30,101 @@ constexpr Correlation kCorrelations[] = {
     [](double lag, double length) { return std::max(0.0, 1.0 - lag / length); },
 };
 
-FilterShape MakeShape(const VectorXd& correlations, const MatrixXd& basis, const Eigen::RowVectorXd& smoothed,
-                      const Eigen::RowVectorXd& halves) {
-  const Index rows = basis.rows();
-  MatrixXd R(rows, rows);
-  for (Index i = 0; i < rows; ++i)
-    for (Index k = 0; k < rows; ++k) R(i, k) = correlations[std::abs(i - k)];
-  FilterShape shape{VectorXd::Zero(CountLags(rows) + 1), (smoothed * R).dot(smoothed),
-                    (halves * R).dot(halves)};
-  // (1 - B B^T) R (1 - B B^T), of which diagonals are needed.
-  const MatrixXd RB = R * basis;
-  const MatrixXd left = 0.5 * basis * (basis.transpose() * RB) - RB;
-  for (Index lag = 0; lag < shape.covariances.size(); ++lag) {
-    const Index count = rows - lag;
-    shape.covariances[lag] = (static_cast<double>(count) * correlations[lag] +
-                              (left.topRows(count).cwiseProduct(basis.bottomRows(count))).sum() +
-                              (left.bottomRows(count).cwiseProduct(basis.topRows(count))).sum()) /
-                             static_cast<double>(rows);
+/// Returns the mean square of the smoothed error of values that were rounded to multiples of a step. Where
+/// between two multiples they are is not known.
+double CalcRoundingSquare(const VectorXd& values, double step, const Eigen::RowVectorXd& smoothed) {
+  constexpr int kPhases = 4;
+  double sum = 0.0;
+  for (int k = 0; k < kPhases; ++k) {
+    const Eigen::ArrayXd steps = values.array() / step + (k + 0.5) / kPhases;
+    const double error = step * smoothed.dot((steps.round() - steps).matrix());
+    sum += error * error / kPhases;
   }
-  return shape;
+  return sum;
 }
 
 }  // namespace
 
-VectorXd CalcCovariances(const Eigen::Ref<const VectorXd>& residual, Index lags) {
-  VectorXd covariances(lags + 1);
-  for (Index lag = 0; lag <= lags; ++lag) {
-    const Index count = residual.size() - lag;
-    covariances[lag] = residual.head(count).dot(residual.tail(count)) / static_cast<double>(residual.size());
+FilteredNoise::FilteredNoise(Index rows, Index joints, int order)
+    : rows_(rows),
+      order_(order),
+      squares_(static_cast<size_t>(joints)),
+      covariances_(MatrixXd::Zero(CountLags() + 1, joints)),
+      rounding_(VectorXd::Zero(joints)) {
+  constexpr Index kFewestParts = 8, kLongest = 12;
+  const Index parts = std::max(kFewestParts, rows / kLongest);
+  for (Index k = 0; k < rows; ++k) halves_[k * parts / rows % 2].push_back(k);
+}
+
+Index FilteredNoise::CountLags() const {
+  constexpr Index kMost = 64;
+  return std::min(rows_ / 2, kMost);
+}
+
+void FilteredNoise::SetWindow(const VectorXd& times, const Eigen::RowVectorXd& smoothed) {
+  MatrixXd powers = MatrixXd::Ones(rows_, std::min(kMostOrder + 1, rows_ / 3));
+  for (Index p = 1; p < powers.cols(); ++p)
+    powers.col(p) = powers.col(p - 1).cwiseProduct(times / times.cwiseAbs().maxCoeff());
+  smoothed_ = smoothed;
+  difference_.setZero(rows_);
+  for (const int k : {0, 1}) {
+    const MatrixXd half = powers(halves_[k], Eigen::seqN(0, std::min<Index>(order_ + 1, powers.cols())));
+    difference_(halves_[k]) =
+        (k == 0 ? 1.0 : -1.0) * half.completeOrthogonalDecomposition().pseudoInverse().row(0);
   }
-  return covariances;
+  difference_ *= smoothed.norm() / difference_.norm();
+  basis_ = Eigen::HouseholderQR<MatrixXd>(powers).householderQ() * MatrixXd::Identity(rows_, powers.cols());
+  if (shapes_.empty()) ListShapes();
 }
 
-std::vector<FilterShape> ListFilterShapes(const MatrixXd& basis, const Eigen::RowVectorXd& smoothed,
-                                          const Eigen::RowVectorXd& halves) {
-  const Index rows = basis.rows();
-  std::vector<FilterShape> shapes = {MakeShape(VectorXd::Unit(rows, 0), basis, smoothed, halves)};
-  // A filter of an eighth of the window leaves too little that the polynomial does not follow.
+void FilteredNoise::Add(Index joint, const VectorXd& torque, double quantum) {
+  const double difference = difference_.dot(torque);
+  squares_[static_cast<size_t>(joint)].push_back(difference * difference);
+  const VectorXd fitted = basis_ * (basis_.transpose() * torque);
+  const VectorXd left = torque - fitted;
+  const double square = left.squaredNorm();
+  for (Index lag = 0; lag < covariances_.rows() && square > 0.0; ++lag)
+    covariances_(lag, joint) += left.head(rows_ - lag).dot(left.tail(rows_ - lag)) / square;
+  if (quantum > 0.0) rounding_[joint] += CalcRoundingSquare(fitted, quantum, smoothed_);
+}
+
+FilteredNoise::Shape FilteredNoise::MakeShape(const VectorXd& correlations) const {
+  MatrixXd R(rows_, rows_);
+  for (Index i = 0; i < rows_; ++i)
+    for (Index k = 0; k < rows_; ++k) R(i, k) = correlations[std::abs(i - k)];
+  Shape shape{VectorXd(covariances_.rows()), (smoothed_ * R).dot(smoothed_),
+              (difference_ * R).dot(difference_)};
+  // Diagonals of (1 - B B^T) R (1 - B B^T).
+  const MatrixXd RB = R * basis_;
+  const MatrixXd half = 0.5 * basis_ * (basis_.transpose() * RB) - RB;
+  for (Index lag = 0; lag < shape.covariances.size(); ++lag) {
+    const Index count = rows_ - lag;
+    shape.covariances[lag] = static_cast<double>(count) * correlations[lag] +
+                             half.topRows(count).cwiseProduct(basis_.bottomRows(count)).sum() +
+                             half.bottomRows(count).cwiseProduct(basis_.topRows(count)).sum();
+  }
+  return shape;
+}
+
+void FilteredNoise::ListShapes() {
   constexpr double kFinest = 1.4, kMostOfWindow = 0.125;
+  shapes_ = {MakeShape(VectorXd::Unit(rows_, 0))};
   for (const Correlation& correlation : kCorrelations)
-    for (double length = 1.0; length < kMostOfWindow * static_cast<double>(rows); length *= kFinest) {
-      VectorXd correlations(rows);
-      for (Index lag = 0; lag < rows; ++lag)
+    for (double length = 1.0; length < kMostOfWindow * static_cast<double>(rows_); length *= kFinest) {
+      VectorXd correlations(rows_);
+      for (Index lag = 0; lag < rows_; ++lag)
         correlations[lag] = correlation(static_cast<double>(lag), length);
-      shapes.push_back(MakeShape(correlations, basis, smoothed, halves));
+      shapes_.push_back(MakeShape(correlations));
     }
-  return shapes;
 }
 
-double CalcSmoothedRatio(const VectorXd& covariances, const std::vector<FilterShape>& shapes) {
-  const FilterShape& white = shapes.front();
-  // The first shape is white; noise is filtered only where that says far more, since what is seen of a long
-  // filter's noise is a small part of it.
+double FilteredNoise::CalcRatio(const VectorXd& covariances) const {
+  const Shape& white = shapes_.front();
+  // Noise is filtered only where that says far more: a long filter's noise is hardly seen beside a
+  // polynomial, so that little of it would count much.
   constexpr double kFarLess = 0.3;
   double best = std::numeric_limits<double>::infinity(), ratio = 1.0;
-  for (const FilterShape& shape : shapes) {
+  for (const Shape& shape : shapes_) {
     MatrixXd A(covariances.size(), 2);
     A << white.covariances, shape.covariances;
     Eigen::Vector2d share = A.completeOrthogonalDecomposition().solve(covariances);
@@ -95,6 +141,14 @@ double CalcSmoothedRatio(const VectorXd& covariances, const std::vector<FilterSh
                       (share[0] * white.halves + share[1] * shape.halves));
   }
   return ratio;
+}
+
+double FilteredNoise::Calc(Index joint) const {
+  constexpr double kMedian = 0.455;  // of chi^2 with one degree of freedom
+  const std::vector<double>& squares = squares_[static_cast<size_t>(joint)];
+  if (squares.empty()) return 0.0;
+  return std::max(std::sqrt(Median(squares) / kMedian) * CalcRatio(covariances_.col(joint)),
+                  std::sqrt(rounding_[joint] / static_cast<double>(squares.size())));
 }
 
 }  // namespace dexcheck

@@ -360,55 +360,33 @@ void MotionFit::CalcSpeeds() {
 }
 
 VectorXd MotionFit::CalcFilteredNoise() {
-  // The halves are every other part of a window.
-  constexpr Eigen::Index kFewestParts = 8, kLongest = 12;
-  constexpr double kMedian = 0.455;  // of chi^2 with one degree of freedom
-  // Polynomials that follow all that the robot does leave the noise.
-  constexpr Eigen::Index kMostOrder = 9;
+  const Eigen::Index n = model_->num_joints();
   const int time = ChannelOf(RecordedQuantity::kTime, -1);
-  const auto rows = static_cast<Eigen::Index>(2 * half_ + 1);
-  std::vector<Eigen::Index> halves[2];
-  const Eigen::Index parts = std::max(kFewestParts, rows / kLongest);
-  for (Eigen::Index k = 0; k < rows; ++k) halves[k * parts / rows % 2].push_back(k);
-  VectorXd noise = VectorXd::Zero(model_->num_joints());
-  if (halves[1].size() <= kOrder) return noise;
-  std::vector<std::vector<double>> squares(static_cast<size_t>(noise.size()));
-  MatrixXd covariances = MatrixXd::Zero(CountLags(rows) + 1, noise.size());
-  std::vector<FilterShape> shapes;
+  VectorXd noise = VectorXd::Zero(n), quanta = noise;
+  for (int joint = 0; joint < n; ++joint) {
+    const int channel = ChannelOf(Effort(), joint);
+    const double quantum = channel < 0 ? 0.0 : FindQuantum(channel);
+    // Errors of a third of a step make up for what rounding leaves out.
+    if (quantum > 3.0 * facts_.torque[joint]) quanta[joint] = quantum;
+  }
+  FilteredNoise filtered(static_cast<Eigen::Index>(2 * half_ + 1), n, kOrder);
+  if (!filtered.is_possible()) return noise;
   for (const size_t centre : ListCentres(CalcReach())) {
     const MatrixXd window = GetWindow(centre, half_);
-    MatrixXd all = MatrixXd::Ones(rows, std::min<Eigen::Index>(kMostOrder + 1, rows / 3));
-    for (Eigen::Index p = 1; p < all.cols(); ++p)
-      all.col(p) = all.col(p - 1).array() * (window.col(time).array() - rows_ahead_[centre][time]) /
-                   (static_cast<double>(half_) * facts_.step);
-    const auto powers = all.leftCols(std::min<Eigen::Index>(kOrder + 1, all.cols()));
-    Eigen::RowVectorXd difference = Eigen::RowVectorXd::Zero(rows);
-    for (const int k : {0, 1})
-      difference(halves[k]) =
-          (k == 0 ? 1.0 : -1.0) *
-          MatrixXd(powers(halves[k], Eigen::all)).completeOrthogonalDecomposition().pseudoInverse().row(0);
-    const Eigen::RowVectorXd smoothed = CalcCoefficients(centre, half_, kOrder).row(0);
-    difference *= smoothed.norm() / difference.norm();
-    const MatrixXd basis =
-        Eigen::HouseholderQR<MatrixXd>(all).householderQ() * MatrixXd::Identity(rows, all.cols());
-    if (shapes.empty()) shapes = ListFilterShapes(basis, smoothed, difference);
-    // Friction that turns round is no noise.
+    filtered.SetWindow(window.col(time).array() - rows_ahead_[centre][time],
+                       CalcCoefficients(centre, half_, kOrder).row(0));
     Emit(centre, [&](const RecordedSample& sample) {
-      for (Eigen::Index joint = 0; joint < noise.size(); ++joint) {
-        const int channel = ChannelOf(Effort(), static_cast<int>(joint));
-        const bool moves = facts_.moves[static_cast<size_t>(joint)];
-        if (channel < 0 || (moves && sample.slowest[joint] < facts_.rest[joint])) continue;
-        const VectorXd torque = window.col(channel);
-        squares[static_cast<size_t>(joint)].push_back(Square(difference.dot(torque)));
-        const VectorXd own = CalcCovariances(torque - basis * (basis.transpose() * torque), CountLags(rows));
-        if (own[0] > 0.0) covariances.col(joint) += own / own[0];
+      for (int joint = 0; joint < n; ++joint) {
+        const int channel = ChannelOf(Effort(), joint);
+        // Friction that turns round is no noise.
+        const bool slides =
+            !facts_.moves[static_cast<size_t>(joint)] || sample.slowest[joint] >= facts_.rest[joint];
+        if (channel >= 0 && slides) filtered.Add(joint, window.col(channel), quanta[joint]);
       }
       return true;
     });
   }
-  for (Eigen::Index joint = 0; joint < noise.size(); ++joint)
-    noise[joint] = std::sqrt(Median(squares[static_cast<size_t>(joint)]) / kMedian) *
-                   (shapes.empty() ? 1.0 : CalcSmoothedRatio(covariances.col(joint), shapes));
+  for (int joint = 0; joint < n; ++joint) noise[joint] = filtered.Calc(joint);
   return noise;
 }
 

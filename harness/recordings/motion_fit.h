@@ -117,8 +117,7 @@ class MotionFit {
   void CheckRows();
   /// Noise of each channel: what polynomials over short windows leave.
   [[nodiscard]] VectorXd MeasureNoise(const std::vector<size_t>& centres, size_t half) const;
-  /// Noise of smoothed torques, which a drive's filter has made similar in rows that follow each other: fits
-  /// to two halves of a window differ by it.
+  /// Noise of smoothed torques behind a filter, or rounded.
   [[nodiscard]] VectorXd CalcFilteredNoise();
   void ChooseWindow(const std::vector<size_t>& centres);
   void CalcSpeeds();

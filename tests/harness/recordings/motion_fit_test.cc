@@ -40,6 +40,24 @@ MatrixXd FitTorques(const RecordedTable& table, VectorXd* noise) {
   return all;
 }
 
+TEST(MotionFit, StatesTheNoiseOfRoundedTorques) {
+  std::mt19937 random(5);
+  const RecordedTable exact = RecordRobot(kMjcf, {}, {.encoder_bits = 16, .torque_noise = 0.0}, &random);
+  for (const double step : {0.02, 0.05}) {
+    RecordedTable rounded = exact;
+    for (const std::string& name : exact.names)
+      if (name.starts_with("tau."))
+        for (double& torque : rounded.Get(name)) torque = step * std::round(torque / step);
+    VectorXd stated, unused;
+    const MatrixXd difference = FitTorques(rounded, &stated) - FitTorques(exact, &unused);
+    for (Eigen::Index joint = 0; joint < stated.size(); ++joint) {
+      const double spread = difference.col(joint).norm() / std::sqrt(static_cast<double>(difference.rows()));
+      EXPECT_GT(stated[joint], 0.6 * spread) << step << ", joint " << joint;
+      EXPECT_LT(stated[joint], 2.0 * spread) << step << ", joint " << joint;
+    }
+  }
+}
+
 TEST(MotionFit, StatesTheNoiseOfFilteredTorques) {
   std::mt19937 random(5);
   // Coarse encoders, so that windows are long.
