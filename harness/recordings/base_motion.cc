@@ -130,23 +130,33 @@ double FindShaking(const RecordingSet& recordings, const TorqueRows& rows, const
   return explained(best) > kFraction * accelerations.left() ? best : 0.0;
 }
 
-/// Since when.
+/// Returns since when an acceleration of the base, or a payload, explains most to the end.
 static std::optional<double> FindStep(const RecordingSet& recordings, const TorqueRows& rows,
                                       const VectorXd& left, size_t recording) {
-  if (recordings.model().base().type != BaseType::kFixed) return std::nullopt;
+  const RobotModel& model = recordings.model();
   const std::vector<TorqueBalance::Block>& blocks = recordings[recording].fit->blocks();
-  const PushProducts accelerations(recordings, rows, left, {.recording = static_cast<int>(recording)});
-  const auto explained = [&](double from) {
-    return accelerations.CalcExplained([from](const TorqueBalance::Block& block) {
-      return VectorXd::Constant(1, block.from >= from ? 1.0 : 0.0);
-    });
-  };
-  // An acceleration that holds nearly all the time is gravity.
-  const double begin = blocks[blocks.size() / 10].to, end = blocks.back().from,
-               least = kFraction * accelerations.left();
-  const double best =
-      FindMost(explained, begin, end, (end - begin) / static_cast<double>(blocks.size()), least, 0);
-  return explained(best) > least ? std::optional(best) : std::nullopt;
+  std::vector<int> payloads = ListLastLinks(model);
+  if (model.base().type == BaseType::kFixed) payloads.push_back(-1);
+  // What holds nearly all the time is gravity, or a payload of the whole recording.
+  const double begin = blocks[blocks.size() / 10].to, end = blocks.back().from;
+  std::optional<double> step;
+  double most = 0.0;
+  for (const int payload : payloads) {
+    const PushProducts products(recordings, rows, left,
+                                {.recording = static_cast<int>(recording), .payload = payload});
+    const auto explained = [&](double from) {
+      return products.CalcExplained([from](const TorqueBalance::Block& block) {
+        return VectorXd::Constant(1, block.from >= from ? 1.0 : 0.0);
+      });
+    };
+    most = std::max(most, kFraction * products.left());
+    const double best =
+        FindMost(explained, begin, end, (end - begin) / static_cast<double>(blocks.size()), most, 0);
+    if (!(explained(best) > most)) continue;
+    step = best;
+    most = explained(best);
+  }
+  return step;
 }
 
 std::vector<Push> FindPushes(const RecordingSet& recordings, const TorqueRows& rows, const VectorXd& left,
@@ -196,6 +206,12 @@ std::vector<TorqueFault> ListPushes(const RobotModel& model, const std::vector<i
       one.push.has_moment = has_moment;
     }
   add("acceleration", "base", "m/s^2", 3, kMostAcceleration);
+  for (const int link : ListLastLinks(model)) {
+    TorqueFault& payload = add("payload", "link " + model.link_name(link), "kg", 4, 0.0);
+    payload.push.payload = link;
+    payload.scale = Eigen::Vector4d(5.0, 0.5, 0.5, 0.5);
+    payload.is_possible = IsPayload;
+  }
   for (const int joint : joints) {
     const std::string place = "joint " + model.joint(joint).name;
     const char* const unit = model.joint(joint).type == JointType::kRevolute ? "N m" : "N";

@@ -145,11 +145,12 @@ Fault CauseDescription::Describe(const TorqueFault& fault, const VectorXd& a, Ve
                              : shown.norm();
   const auto vector = ShowVector;
   using enum TorqueFault::Kind;
-  if (fault.kind == kPayload) {
+  const int carrier = fault.kind == kPayload ? fault.index : fault.push.payload;
+  if (carrier >= 0) {
     one.value = a[0];
     one.error = error[0];
-    const Vector3d place = frames_.Find(fault.index).inverse() * Vector3d(a.segment<3>(1) / a[0]);
-    one.detail = "at " + vector(place) + " m" + InFrameOf(fault.index);
+    const Vector3d place = frames_.Find(carrier).inverse() * Vector3d(a.segment<3>(1) / a[0]);
+    one.detail = "at " + vector(place) + " m" + InFrameOf(carrier);
   } else if (fault.kind == kCentre) {
     const Matrix3d R = frames_.Find(fault.index).linear();
     one.detail = "moved by " + vector(R.transpose() * fault.axes * a) + InFrameOf(fault.index);

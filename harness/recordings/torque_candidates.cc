@@ -309,14 +309,9 @@ class FaultList {
 
   /// Adds payloads at a link that carries no other one.
   void AddPayload(int link) {
-    for (int joint = 0; joint < model_.num_joints(); ++joint)
-      if (model_.joint(joint).parent == link) return;
+    if (!std::ranges::count(ListLastLinks(model_), link)) return;
     constexpr double kMass = 5.0, kMoment = 0.5;
     const BodyVector own = TorqueRegressor::Pack(model_.joint(link).body);
-    const auto is_near = [](const VectorXd& a) {
-      constexpr double kFarthest = 0.5;  // m
-      return a[0] > 0.0 && a.segment<3>(1).norm() < kFarthest * a[0];
-    };
     const int first = recordings_ > 1 ? 0 : -1;
     for (int recording = first; recording < first + recordings_; ++recording) {
       // A point, and a body with an inertia of its own.
@@ -329,10 +324,10 @@ class FaultList {
         one.most = VectorXd::Constant(width, kInfinite);
         one.most[0] = std::accumulate(model_.joints().begin(), model_.joints().end(), 0.0,
                                       [](double sum, const Joint& each) { return sum + each.body.mass; });
-        one.is_possible = is_near;
+        one.is_possible = IsPayload;
         // Link and payload together are a possible body.
         if (width == TorqueRegressor::kBody && IsBody(own))
-          one.is_possible = [=](const VectorXd& a) { return is_near(a) && IsBody(own + BodyVector(a)); };
+          one.is_possible = [=](const VectorXd& a) { return IsPayload(a) && IsBody(own + BodyVector(a)); };
         one.is_ordinary = width == 4;
       }
     }
@@ -438,6 +433,18 @@ std::vector<TorqueFault> ListTorqueFaults(const RobotModel& model, const std::ve
   return FaultList(model, joints, recordings, refinements, extents, frames).Make();
 }
 
+std::vector<int> ListLastLinks(const RobotModel& model) {
+  std::vector<int> links;
+  for (int link = 0; link < model.num_joints(); ++link)
+    if (!std::ranges::count(model.joints(), link, &Joint::parent)) links.push_back(link);
+  return links;
+}
+
+bool IsPayload(const VectorXd& a) {
+  constexpr double kFarthest = 0.5;  // m
+  return a[0] > 0.0 && a.segment<3>(1).norm() < kFarthest * a[0];
+}
+
 static void ShiftCentre(const RobotModel& model, const VectorXd& amplitude, TorqueFault* centre) {
   MassProperties body = model.joint(centre->index).body;
   body.com += 0.5 * centre->axes * amplitude;
@@ -448,25 +455,31 @@ static void ShiftCentre(const RobotModel& model, const VectorXd& amplitude, Torq
   }
 }
 
-static void PlacePayload(double mass, const Vector3d& h, TorqueFault* payload) {
+/// Returns the columns of a point mass near to where it is.
+static Eigen::Matrix<double, TorqueRegressor::kBody, 4> CalcPayloadColumns(double mass, const Vector3d& h) {
   const auto at = [&](const Vector3d& moment) {
     return BodyVector(TorqueRegressor::Pack({mass, moment / mass, Matrix3d::Zero()}));
   };
   // It is a square of h, and of degree one in mass and h together: its derivatives times these are itself.
+  Eigen::Matrix<double, TorqueRegressor::kBody, 4> columns;
   BodyVector rest = at(h);
   for (int k = 0; k < 3; ++k) {
-    const BodyVector column = 0.5 * (at(h + Vector3d::Unit(k)) - at(h - Vector3d::Unit(k)));
-    payload->sums[static_cast<size_t>(k + 1)] = BodyParts(payload->index, column, payload->recording);
-    rest -= h[k] * column;
+    columns.col(k + 1) = 0.5 * (at(h + Vector3d::Unit(k)) - at(h - Vector3d::Unit(k)));
+    rest -= h[k] * columns.col(k + 1);
   }
-  payload->sums.front() = BodyParts(payload->index, rest / mass, payload->recording);
+  columns.col(0) = rest / mass;
+  return columns;
 }
 
 void PlaceMass(const RobotModel& model, const VectorXd& amplitude, TorqueFault* fault) {
   if (fault->is_possible && !fault->is_possible(amplitude)) return;
   if (fault->kind == TorqueFault::kCentre) ShiftCentre(model, amplitude, fault);
-  if (fault->kind == TorqueFault::kPayload && fault->sums.size() == 4)
-    PlacePayload(amplitude[0], amplitude.segment<3>(1), fault);
+  const bool is_point = fault->kind == TorqueFault::kPayload && fault->sums.size() == 4;
+  if (!is_point && fault->push.payload < 0) return;
+  fault->push.masses = CalcPayloadColumns(amplitude[0], amplitude.segment<3>(1));
+  for (int k = 0; k < 4 && is_point; ++k)
+    fault->sums[static_cast<size_t>(k)] =
+        BodyParts(fault->index, fault->push.masses.col(k), fault->recording);
 }
 
 }  // namespace dexcheck

@@ -20,15 +20,19 @@ struct ColumnPart {
 };
 
 /// A force on a link (three columns, world axes, at its centre of mass; six with a moment), a torque at a
-/// joint, a torque of it that is stuck (two columns), or an acceleration of the base (three columns), for a
-/// time.
+/// joint, a torque of it that is stuck (two columns), a point mass on a link (four columns: mass and its
+/// first moment in the link's axes), or an acceleration of the base (three columns), for a time.
 struct Push {
   int recording = 0;
   double from = 0.0, to = 0.0;  ///< s
   double reach = 0.0;           ///< Over which smoothing spreads its begin and end to each side, s.
   int link = -1;
   bool has_moment = false;
-  int joint = -1;         ///< -1 besides no link: the base.
+  int joint = -1;
+  int payload = -1;  ///< Link that carries a mass. Without it, link and joint: the base.
+  /// BodyVectors of the payload's columns: its mass, its first moment, and what inertia a point has there.
+  Eigen::Matrix<double, TorqueRegressor::kBody, 4> masses =
+      Eigen::Matrix<double, TorqueRegressor::kBody, 4>::Identity();
   bool is_stuck = false;  ///< The joint's recorded torque is a constant instead of what it was.
   int window = -1;        ///< The stretch of time in which it was found; its candidates share that.
 };
@@ -98,6 +102,11 @@ struct TorqueFault : Candidate {
   /// A fault of bodies, gravity, positions or springs: all but the drive's own numbers.
   [[nodiscard]] bool IsOfLoad() const { return kind == kSpring || (kind >= kZero && kind <= kGravity); }
 };
+
+/// Links that carry no other one, and may carry a payload.
+std::vector<int> ListLastLinks(const RobotModel& model);
+/// Whether a mass and its first moment (kg, kg m) are those of a payload near its link.
+bool IsPayload(const VectorXd& amplitude);
 
 /// How large torques and motion of each joint are (n): what no size of a fault can go far beyond. Empty where
 /// nothing was recorded.

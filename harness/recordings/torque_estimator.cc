@@ -137,6 +137,7 @@ void TorqueEstimator::Relinearise() {
     others.segment(rows_.first[term.candidate], term.amplitude.size()).setZero();
     if (found.kind == TorqueFault::kPush)
       found.push = FindTimes(*recordings_, rows_, rows_.CalcLeft(others), found.push);
+    if (found.push.payload >= 0) PlaceMass(recordings_->model(), term.amplitude, &found);
     if (!found.IsOfLoad()) continue;
     // So are those that may have been in its place.
     const VectorXd y = R_.rightCols<1>() - R_.leftCols(others.size()) * others;

@@ -126,6 +126,11 @@ Eigen::RowVectorXd CalcPushColumns(const RecordingSet& recordings, const Push& p
   Eigen::RowVectorXd columns = Eigen::RowVectorXd::Zero(1);
   if (push.link >= 0) {
     columns = block.forces.row(place).segment(6 * push.link, push.has_moment ? 6 : 3) / block.samples;
+  } else if (push.payload >= 0) {
+    columns.setZero(4);
+    for (int k = 0; k < TorqueRegressor::kBody && block.counts[part.place] > 0.0; ++k)
+      if (const Index at = part.balance->Find(part.place, {TorqueColumn::kBody, push.payload, k}); at >= 0)
+        columns += block.sums[part.place][at] / block.counts[part.place] * push.masses.row(k);
   } else if (push.joint < 0) {
     // To be accelerated is to weigh the other way.
     columns = -block.gravity.row(place) / block.samples;

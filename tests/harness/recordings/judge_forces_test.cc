@@ -151,5 +151,28 @@ TEST(ClusteredVariances, OfAMeanAreThoseOfTheClustersMeans) {
   EXPECT_EQ(CalcClusteredVariances({clusters[0], {MatrixXd::Zero(1, 1), VectorXd::Zero(1)}})[0], 0.0);
 }
 
+// Since then its weight acts at the hand's centre of mass, and its inertia.
+TEST(JudgeForces, APayloadThatIsPickedUpMidwayIsNamed) {
+  constexpr double kMass = 0.8, kFrom = 8.0;
+  Vector3d last_velocity = Vector3d::Zero();
+  const RecordedFault payload = {.act = [&](double t, const mjModel& robot, mjData* data) {
+    const int hand = robot.nbody - 1;
+    Vector6d twist;  // turning, then moving
+    mj_objectVelocity(&robot, data, mjOBJ_BODY, hand, twist.data(), /*flg_local=*/0);
+    const Vector3d velocity = twist.tail<3>();
+    const Vector3d acceleration = (velocity - std::exchange(last_velocity, velocity)) / robot.opt.timestep;
+    const Vector3d force = kMass * (Vector3d(robot.opt.gravity) - acceleration), none = Vector3d::Zero();
+    if (t >= kFrom)
+      mj_applyFT(&robot, data, force.data(), none.data(), data->xipos + 3 * hand, hand, data->qfrc_applied);
+  }};
+  const RecordingJudgement judgement = Judge(Record({payload}));
+  ASSERT_EQ(judgement.causes.size(), 1U) << Tell(judgement);
+  const Explanation& cause = judgement.causes[0];
+  EXPECT_EQ(cause.outcome, CauseOutcome::kNamed) << Tell(judgement);
+  EXPECT_EQ(cause.faults[0].fault + ", " + cause.faults[0].place, "payload, link panda_link7");
+  EXPECT_NEAR(cause.faults[0].value, kMass, 0.05 * kMass);
+  EXPECT_NEAR(cause.from, kFrom, 0.3);
+}
+
 }  // namespace
 }  // namespace dexcheck::testing::judge_forces_test
