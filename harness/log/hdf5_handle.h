@@ -54,9 +54,6 @@ class Handle {
     if (id_ >= 0) CloseFunction(id_);
   }
   Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, H5I_INVALID_HID)) {}
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-  Handle& operator=(Handle&&) = delete;
 
   /// Closes now. @throws Hdf5Error when that fails, as for a file whose last bytes cannot be written.
   void Close() { Check(CloseFunction(std::exchange(id_, H5I_INVALID_HID))); }
@@ -71,10 +68,8 @@ using Attribute = Handle<H5Aclose>;
 using Dataset = Handle<H5Dclose>;
 using Dataspace = Handle<H5Sclose>;
 using Datatype = Handle<H5Tclose>;
-using Driver = Handle<H5FDunregister>;
 using File = Handle<H5Fclose>;
 using Group = Handle<H5Gclose>;
-using Object = Handle<H5Oclose>;
 using Properties = Handle<H5Pclose>;
 
 /// Keeps HDF5 from printing its errors while it lives.

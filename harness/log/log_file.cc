@@ -6,10 +6,7 @@
 #include <bit>
 #include <cerrno>
 #include <cstring>
-#include <exception>
 #include <limits>
-#include <map>
-#include <new>
 
 #include "controller/common/errors.h"
 #include "harness/log/hdf5_handle.h"
@@ -22,110 +19,6 @@ static_assert(std::endian::native == std::endian::little, "numbers are written a
 
 using hdf5::Check;
 
-// A file that HDF5 writes into memory. HDF5 1.10 cannot close a file on a full disk: it keeps the half-closed
-// file and ends the program with a segmentation fault at its exit. So HDF5 gets a file that is never full,
-// and what it wrote is put on disk without it.
-
-/// Bytes at any offset; what was never written is zero and takes no memory.
-class MemoryImage {
- public:
-  static constexpr size_t kPageSize = 4096;
-  using Page = std::array<unsigned char, kPageSize>;
-
-  void Read(std::uint64_t offset, size_t count, unsigned char* out) const {
-    ForEachPart(offset, count, [&](std::uint64_t number, size_t begin, size_t done, size_t part) {
-      const auto page = pages_.find(number);
-      if (page == pages_.end()) {
-        std::memset(out + done, 0, part);
-      } else {
-        std::memcpy(out + done, page->second.data() + begin, part);
-      }
-    });
-  }
-
-  void Write(std::uint64_t offset, size_t count, const unsigned char* bytes) {
-    ForEachPart(offset, count, [&](std::uint64_t number, size_t begin, size_t done, size_t part) {
-      std::memcpy(pages_[number].data() + begin, bytes + done, part);
-    });
-  }
-
-  /// By page number; page n begins at n * kPageSize.
-  [[nodiscard]] const std::map<std::uint64_t, Page>& pages() const { return pages_; }
-  /// Size that HDF5 has given the file, whether written yet or not.
-  [[nodiscard]] std::uint64_t size() const { return size_; }
-  void set_size(std::uint64_t size) { size_ = size; }
-
- private:
-  /// Calls act(page number, begin within the page, begin within the range, count) for each page of a range.
-  template <typename Action>
-  static void ForEachPart(std::uint64_t offset, size_t count, const Action& act) {
-    for (size_t done = 0; done < count;) {
-      const std::uint64_t at = offset + done;
-      const auto begin = static_cast<size_t>(at % kPageSize);
-      const size_t part = std::min(kPageSize - begin, count - done);
-      act(at / kPageSize, begin, done, part);
-      done += part;
-    }
-  }
-
-  std::map<std::uint64_t, Page> pages_;
-  std::uint64_t size_ = 0;
-};
-
-/// HDF5's record of such a file; the library's own part comes first.
-struct MemoryFile {
-  H5FD_t base;
-  MemoryImage* image;
-};
-
-MemoryImage& ImageOf(const H5FD_t* file) { return *reinterpret_cast<const MemoryFile*>(file)->image; }
-
-/// The driver by which HDF5 writes into an image, to which its properties point. It must outlive the files.
-hdf5::Driver RegisterMemoryDriver() {
-  static const H5FD_class_t driver = [] {
-    H5FD_class_t made{};
-    made.name = "dexcheck_memory";
-    made.maxaddr = static_cast<haddr_t>(std::numeric_limits<std::int64_t>::max());
-    made.fc_degree = H5F_CLOSE_STRONG;
-    made.fapl_size = sizeof(void*);  // a pointer to the image
-    made.open = [](const char* /*name*/, unsigned /*flags*/, hid_t access,
-                   haddr_t /*most*/) noexcept -> H5FD_t* {
-      const void* const image = H5Pget_driver_info(access);
-      auto* const file = image == nullptr ? nullptr : new (std::nothrow) MemoryFile{};
-      if (file == nullptr) return nullptr;
-      file->image = *static_cast<MemoryImage* const*>(image);
-      return &file->base;
-    };
-    made.close = [](H5FD_t* file) noexcept -> herr_t {
-      delete reinterpret_cast<MemoryFile*>(file);
-      return 0;
-    };
-    made.get_eoa = [](const H5FD_t* file, H5FD_mem_t) noexcept -> haddr_t { return ImageOf(file).size(); };
-    made.get_eof = made.get_eoa;
-    made.set_eoa = [](H5FD_t* file, H5FD_mem_t, haddr_t size) noexcept -> herr_t {
-      ImageOf(file).set_size(size);
-      return 0;
-    };
-    made.read = [](H5FD_t* file, H5FD_mem_t, hid_t, haddr_t offset, size_t count,
-                   void* out) noexcept -> herr_t {
-      ImageOf(file).Read(offset, count, static_cast<unsigned char*>(out));
-      return 0;
-    };
-    made.write = [](H5FD_t* file, H5FD_mem_t, hid_t, haddr_t offset, size_t count,
-                    const void* bytes) noexcept -> herr_t {
-      try {
-        ImageOf(file).Write(offset, count, static_cast<const unsigned char*>(bytes));
-        return 0;
-      } catch (const std::exception&) {
-        return -1;  // exceptions must not pass through HDF5
-      }
-    };
-    std::fill(std::begin(made.fl_map), std::end(made.fl_map), H5FD_MEM_DEFAULT);
-    return made;
-  }();
-  return hdf5::Driver(H5FDregister(&driver));
-}
-
 /// A dataset's or attribute's extents: none for a single value.
 using Extents = std::vector<hsize_t>;
 
@@ -134,33 +27,32 @@ hdf5::Dataspace MakeSpace(const Extents& extents) {
   return hdf5::Dataspace(H5Screate_simple(static_cast<int>(extents.size()), extents.data(), nullptr));
 }
 
-/// How a dataset is stored: in one piece, without a time stamp; its numbers' place is taken at the first
-/// write, and not filled.
+/// How a dataset is stored: in one piece, without a time stamp; its numbers' place is taken at once, and not
+/// filled.
 hdf5::Properties MakeDatasetProperties() {
   hdf5::Properties properties(H5Pcreate(H5P_DATASET_CREATE));
   Check(H5Pset_obj_track_times(properties.id(), false));
   Check(H5Pset_layout(properties.id(), H5D_CONTIGUOUS));
-  Check(H5Pset_alloc_time(properties.id(), H5D_ALLOC_TIME_LATE));
+  Check(H5Pset_alloc_time(properties.id(), H5D_ALLOC_TIME_EARLY));
   Check(H5Pset_fill_time(properties.id(), H5D_FILL_TIME_NEVER));
   return properties;
 }
 
 class LogBuilder {
  public:
-  LogBuilder(const LogContent& content, long rows, MemoryImage* image)
+  LogBuilder(const LogContent& content, long rows, const std::filesystem::path& path)
       : content_(content),
         rows_(static_cast<hsize_t>(rows)),
         string_type_(hdf5::MakeStringType()),
         dataset_properties_(MakeDatasetProperties()),
         group_properties_(H5Pcreate(H5P_GROUP_CREATE)),
         link_properties_(H5Pcreate(H5P_LINK_CREATE)),
-        driver_(RegisterMemoryDriver()),
-        file_(CreateFile(driver_, image)) {
+        file_(CreateFile(path)) {
     Check(H5Pset_obj_track_times(group_properties_.id(), false));
     Check(H5Pset_create_intermediate_group(link_properties_.id(), 1));
   }
 
-  /// Writes everything but the numbers, and closes the image. @return the signals' offsets.
+  /// Writes everything but the numbers, and closes the file. @return the signals' offsets.
   std::vector<std::uint64_t> Build() {
     AddRootAttributes();
     AddTexts();
@@ -172,14 +64,13 @@ class LogBuilder {
   }
 
  private:
-  static hdf5::File CreateFile(const hdf5::Driver& driver, MemoryImage* image) {
+  static hdf5::File CreateFile(const std::filesystem::path& path) {
     const hdf5::Properties creation(H5Pcreate(H5P_FILE_CREATE));
     Check(H5Pset_obj_track_times(creation.id(), false));
     const hdf5::Properties access(H5Pcreate(H5P_FILE_ACCESS));
     Check(H5Pset_libver_bounds(access.id(), H5F_LIBVER_EARLIEST, H5F_LIBVER_LATEST));
     Check(H5Pset_fclose_degree(access.id(), H5F_CLOSE_STRONG));
-    Check(H5Pset_driver(access.id(), driver.id(), &image));
-    return hdf5::File(H5Fcreate("log", H5F_ACC_TRUNC, creation.id(), access.id()));
+    return hdf5::File(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, creation.id(), access.id()));
   }
 
   void AddAttribute(hid_t object, const std::string& name, hid_t type, const Extents& extents,
@@ -237,18 +128,7 @@ class LogBuilder {
     for (const auto& [name, value] : signal.attributes) {
       AddAttribute(dataset.id(), name, H5T_IEEE_F64LE, {}, &value);
     }
-    return TakePlace(dataset);
-  }
-
-  /// Takes the signal's place in the file. @return its offset.
-  [[nodiscard]] std::uint64_t TakePlace(const hdf5::Dataset& dataset) const {
     if (rows_ == 0) return 0;
-    const hdf5::Dataspace space(H5Dget_space(dataset.id()));
-    const std::array<hsize_t, 2> first{};
-    Check(H5Sselect_elements(space.id(), H5S_SELECT_SET, 1, first.data()));
-    const hdf5::Dataspace one = MakeSpace({1});
-    const double zero = 0.0;
-    Check(H5Dwrite(dataset.id(), H5T_NATIVE_DOUBLE, one.id(), space.id(), H5P_DEFAULT, &zero));
     const haddr_t offset = H5Dget_offset(dataset.id());
     if (offset == HADDR_UNDEF) throw hdf5::Hdf5Error(hdf5::DescribeLastError());
     return offset;
@@ -260,20 +140,8 @@ class LogBuilder {
   hdf5::Properties dataset_properties_;
   hdf5::Properties group_properties_;
   hdf5::Properties link_properties_;
-  hdf5::Driver driver_;
   hdf5::File file_;
 };
-
-/// Writes the image to an empty file.
-void WriteImage(const std::string& name, int descriptor, const MemoryImage& image) {
-  if (::ftruncate(descriptor, static_cast<off_t>(image.size())) != 0) FailToWrite(name, errno);
-  for (const auto& [number, page] : image.pages()) {
-    const std::uint64_t offset = number * page.size();
-    if (offset >= image.size()) break;
-    const auto count = static_cast<size_t>(std::min<std::uint64_t>(page.size(), image.size() - offset));
-    WriteAt(name, descriptor, page.data(), count, offset);
-  }
-}
 
 void MarkAllRowsUnwritten(const std::string& name, int descriptor, std::uint64_t time_offset, long rows) {
   std::array<double, 4096> chunk;
@@ -320,17 +188,16 @@ void CopyBytes(const std::string& name, int from, std::uint64_t from_offset, int
 
 std::vector<std::uint64_t> WriteLogFile(const std::filesystem::path& path, const std::string& name,
                                         const LogContent& content, long rows) {
-  MemoryImage image;
   std::vector<std::uint64_t> offsets;
   try {
+    // HDF5 cannot close a file on a full disk, and without this would crash over it at the program's end.
     const hdf5::SilencedErrors silenced;
-    offsets = LogBuilder(content, rows, &image).Build();
+    offsets = LogBuilder(content, rows, path).Build();
   } catch (const hdf5::Hdf5Error& error) {
     throw InputError(name + ": cannot be written: " + error.what());
   }
-  FileDescriptor file(::open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
+  FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
   if (!file.is_open()) FailToWrite(name, errno);
-  WriteImage(name, file.get(), image);
   MarkAllRowsUnwritten(name, file.get(), offsets.front(), rows);
   if (const int error = file.Close(); error != 0) FailToWrite(name, error);
   return offsets;
