@@ -111,8 +111,6 @@ class Renderer {
   /// @throws std::invalid_argument for sizes that cannot be drawn.
   Renderer(const mjModel& model, const RenderOptions& options);
   ~Renderer();  // NOLINT(bugprone-exception-escape)
-  Renderer(const Renderer&) = delete;
-  Renderer& operator=(const Renderer&) = delete;
 
   /// Draws the state in `data`, whose kinematics, cameras and lights must be computed.
   Image Render(mjData& data, std::span<const Decoration> decorations = {});

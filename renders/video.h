@@ -32,8 +32,6 @@ class VideoWriter {
   /// @throws std::invalid_argument for sizes or rates that the format cannot take.
   VideoWriter(const std::filesystem::path& path, const EncodingOptions& options);
   ~VideoWriter();
-  VideoWriter(const VideoWriter&) = delete;
-  VideoWriter& operator=(const VideoWriter&) = delete;
 
   /// Appends a frame of the options' size. @throws InputError as the constructor.
   void Write(const Image& image);

@@ -102,8 +102,6 @@ class TemporaryFolder {
   /// @throws InputError "PATH: cannot be made: reason".
   TemporaryFolder();
   ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
  private:
@@ -120,8 +118,6 @@ class PartialFile {
   /// @throws InputError "PATH: cannot be written: reason".
   explicit PartialFile(const std::filesystem::path& target);
   ~PartialFile();
-  PartialFile(const PartialFile&) = delete;
-  PartialFile& operator=(const PartialFile&) = delete;
 
   /// Path to write to.
   [[nodiscard]] const std::filesystem::path& partial() const { return partial_; }

@@ -82,8 +82,6 @@ class OutputFile {
   /// reason".
   explicit OutputFile(const std::filesystem::path& path);
   ~OutputFile();
-  OutputFile(const OutputFile&) = delete;
-  OutputFile& operator=(const OutputFile&) = delete;
 
   /// Writes the whole content, once. @param content a text, JSON, or a function that makes one of them, which
   /// is called if there is a file.

@@ -18,8 +18,6 @@ class LogReader {
   /// Opens the log. A child process reads its structure first, since HDF5 1.10 crashes on some damaged files.
   explicit LogReader(const std::filesystem::path& path);
   ~LogReader();
-  LogReader(const LogReader&) = delete;
-  LogReader& operator=(const LogReader&) = delete;
 
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   /// In the order in which they were added; the first is time.

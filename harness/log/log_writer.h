@@ -32,8 +32,6 @@ class LogWriter {
   LogWriter(const std::filesystem::path& path, long max_rows, long rows_per_flush = kDefaultRowsPerFlush);
   /// Without Close: writes complete rows when it can, and leaves the file as a killed process would.
   ~LogWriter();
-  LogWriter(const LogWriter&) = delete;
-  LogWriter& operator=(const LogWriter&) = delete;
 
   /// Keeps a text in the group "meta", as an attribute; replaces one of the same name. After StartRows it
   /// reaches the file at Close, which then writes the whole file anew.

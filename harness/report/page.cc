@@ -198,8 +198,6 @@ class FigureFolder {
     std::error_code ignored;
     if (made_) fs::remove(folder_, ignored);
   }
-  FigureFolder(const FigureFolder&) = delete;
-  FigureFolder& operator=(const FigureFolder&) = delete;
 
   void Add(const fs::path& picture) {
     files_.push_back(std::make_unique<PartialFile>(folder_ / picture.filename()));
