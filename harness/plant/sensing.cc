@@ -132,13 +132,13 @@ void ObjectSensor::Filter(const Pose& seen, bool is_new) {
   orientation_gains_.Correct();
   const Vector3d e_p = seen.translation() - estimate_.translation();
   const Vector3d e_R = LogSo3(estimate_.linear().transpose() * seen.linear());
-  estimate_.translation() += position_gains_.k_x() * e_p;
-  p_dot_ += position_gains_.k_v() * e_p;
+  estimate_.translation() += position_gains_.k()[0] * e_p;
+  p_dot_ += position_gains_.k()[1] * e_p;
   // Products of rotations leave the group by rounding.
-  estimate_.linear() = Eigen::Quaterniond(estimate_.linear() * ExpSo3(orientation_gains_.k_x() * e_R))
+  estimate_.linear() = Eigen::Quaterniond(estimate_.linear() * ExpSo3(orientation_gains_.k()[0] * e_R))
                            .normalized()
                            .toRotationMatrix();
-  omega_ += orientation_gains_.k_v() * e_R;
+  omega_ += orientation_gains_.k()[1] * e_R;
 }
 
 double ObjectSensor::FindAge(std::uint64_t k) const {

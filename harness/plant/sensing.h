@@ -30,68 +30,54 @@ class KalmanGains {
  public:
   KalmanGains() = default;
   /// @param sigma m/s^2 or rad/s^2. @param R variance of the position measured, m^2 or rad^2.
-  KalmanGains(double sigma, double R, double time_step)
-      : dt_(time_step), q_(sigma * sigma * time_step * time_step), R_(R) {}
+  KalmanGains(double sigma, double R, double time_step) : R_(R) {
+    const Vector2d g = sigma * time_step * Vector2d(time_step, 1.0);
+    F_(0, 1) = time_step;
+    Q_ = g * g.transpose();
+  }
 
   /// Predicts one step: P = F P F^T + Q, F = [1 dt; 0 1], Q = sigma^2 dt^2 [dt; 1] [dt; 1]^T.
-  void Predict() {
-    xx_ += dt_ * (2.0 * xv_ + dt_ * vv_) + q_ * dt_ * dt_;
-    xv_ += dt_ * vv_ + q_ * dt_;
-    vv_ += q_;
-  }
+  void Predict() { P_ = F_ * P_ * F_.transpose() + Q_; }
   /// Corrects by a measured position: sets the gains of position and velocity on the innovation.
   void Correct() {
-    const double S = xx_ + R_;  // variance of the innovation
-    k_x_ = xx_ / S;
-    k_v_ = xv_ / S;
-    vv_ -= k_v_ * xv_;
-    xv_ -= k_x_ * xv_;
-    xx_ -= k_x_ * xx_;
+    k_ = P_.col(0) / (P_(0, 0) + R_);
+    P_ -= (k_ * P_.row(0)).eval();
   }
   /// Begins with a position as exact as its measurement, and a velocity with standard deviation `spread`.
-  void Reset(double spread) {
-    xx_ = R_;
-    xv_ = 0.0;
-    vv_ = spread * spread;
-  }
+  void Reset(double spread) { P_ = Vector2d(R_, spread * spread).asDiagonal(); }
 
-  [[nodiscard]] double k_x() const { return k_x_; }
-  [[nodiscard]] double k_v() const { return k_v_; }  ///< 1/s.
+  [[nodiscard]] const Matrix2d& F() const { return F_; }
+  [[nodiscard]] const Vector2d& k() const { return k_; }  ///< Of position and velocity: 1, 1/s.
 
  private:
-  double dt_ = 0.0, q_ = 0.0, R_ = 0.0;
-  double xx_ = 0.0, xv_ = 0.0, vv_ = 0.0;
-  double k_x_ = 0.0, k_v_ = 0.0;
+  Matrix2d F_ = Matrix2d::Identity(), Q_ = Matrix2d::Zero(), P_ = Matrix2d::Zero();
+  Vector2d k_ = Vector2d::Zero();
+  double R_ = 0.0;
 };
 
 /// A Kalman filter of one coordinate with KalmanGains.
 class VelocityFilter {
  public:
   VelocityFilter() = default;
-  VelocityFilter(double sigma, double R, double time_step) : gains_(sigma, R, time_step), dt_(time_step) {}
+  VelocityFilter(double sigma, double R, double time_step) : gains_(sigma, R, time_step) {}
 
   void Reset(double y, double v) {
     // The first velocity is the plant's at rest, or nearly.
     constexpr double kStartSpread = 0.1;
     gains_.Reset(kStartSpread);
-    x_ = y;
-    v_ = v;
+    x_ << y, v;
   }
   void Update(double y) {
     gains_.Predict();
     gains_.Correct();
-    x_ += dt_ * v_;
-    const double innovation = y - x_;
-    x_ += gains_.k_x() * innovation;
-    v_ += gains_.k_v() * innovation;
+    x_ = (gains_.F() * x_).eval();
+    x_ += gains_.k() * (y - x_[0]);
   }
-  [[nodiscard]] double x() const { return x_; }
-  [[nodiscard]] double v() const { return v_; }
+  [[nodiscard]] double v() const { return x_[1]; }
 
  private:
   KalmanGains gains_;
-  double dt_ = 0.0;
-  double x_ = 0.0, v_ = 0.0;
+  Vector2d x_ = Vector2d::Zero();  // position, velocity
 };
 
 /// Pose and body velocity of the object.
