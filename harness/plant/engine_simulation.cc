@@ -128,11 +128,15 @@ void EngineSimulation::CheckHealth(double expected_time) const {
 
 void EngineSimulation::Change(const std::function<void(mjModel*)>& change) {
   change(model_.get());
+  DeriveConstants(model_.get());
+}
+
+void DeriveConstants(mjModel* model) {
   // mj_setConst would join bodies where they touch at qpos0, not where they were joined.
-  const VectorXd joined = Copy(model_->eq_data, mjNEQDATA * model_->neq);
-  const MjDataPtr scratch = MakeData(*model_);
-  mj_setConst(model_.get(), scratch.get());
-  std::copy_n(joined.data(), joined.size(), model_->eq_data);
+  const VectorXd joined = Copy(model->eq_data, mjNEQDATA * model->neq);
+  const MjDataPtr scratch = MakeData(*model);
+  mj_setConst(model, scratch.get());
+  std::copy_n(joined.data(), joined.size(), model->eq_data);
 }
 
 EngineState EngineSimulation::GetState() const {

@@ -69,6 +69,9 @@ class EngineSimulation {
   std::vector<int> dofs_;    // by entry of tau', as motors_
 };
 
+/// Computes what the engine derives from masses and places; bodies stay joined where they are.
+void DeriveConstants(mjModel* model);
+
 /// Returns one of the engine's contacts. @param first whether the body whose slip it is stands first in it.
 BodyContact ReadContact(const mjModel& m, const mjData& d, int contact, bool first);
 /// Returns the contact of `body` with `other`, once the step's forces are known.

@@ -9,6 +9,7 @@
 #include "controller/common/text.h"
 #include "controller/control/stance.h"
 #include "controller/dynamics/model_terms.h"
+#include "harness/engine/map_vector.h"
 #include "harness/scenario/start_state.h"
 
 namespace dexcheck {
@@ -173,9 +174,7 @@ JointPlan MakeJointPlan(const Scenario& scenario, const RobotPair& robots, Start
   Pose X_Bo = Pose::Identity();
   if (model.object()) {
     const mjModel& m = *robots.engine;
-    const mjtNum* const pose = m.qpos0 + m.jnt_qposadr[m.body_jntadr[robots.adapter->object_body()]];
-    X_Bo.translation() << pose[0], pose[1], pose[2];
-    X_Bo.linear() = Eigen::Quaterniond(pose[3], pose[4], pose[5], pose[6]).toRotationMatrix();
+    X_Bo = ReadFreePose(m.qpos0 + m.jnt_qposadr[m.body_jntadr[robots.adapter->object_body()]]);
   }
   PlaceObject(X_Bo, start);
   return {JointMotion(start->q, points, oscillations), FindGains(task, joints, model, start->q)};

@@ -12,8 +12,10 @@
 #include "controller/model/parameter_reader.h"
 #include "harness/base/files.h"
 #include "harness/comparison/engine_constants.h"
+#include "harness/engine/map_vector.h"
 #include "harness/engine/mjcf_passes.h"
 #include "harness/engine/mujoco_release.h"
+#include "harness/plant/engine_simulation.h"
 #include "harness/plant/random_stream.h"
 
 namespace dexcheck {
@@ -164,8 +166,6 @@ DeclaredMismatch::DeclaredMismatch(RobotModel the_plant, MjModelPtr engine_witho
 
 namespace {
 
-using RowMatrix3d = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-
 /// The robot's links and the object, by name: base, joints' links, object.
 class Bodies {
  public:
@@ -206,12 +206,11 @@ class Bodies {
 
   void MoveCom(size_t body, const Vector3d& shift) {
     Model(body).com += shift;
-    const Vector3d moved = R_engine_link_[body] * shift;
+    const Vector3d moved = X_engine_link_[body].linear() * shift;
     for (const int id : EngineBodies(body)) {
       if (IsWheel(id)) continue;
       // Bodies that are welded to the link's own are turned against it at most.
-      const Eigen::Map<const RowMatrix3d> R_own(reference_->xmat + 9 * MainBody(body));
-      const Eigen::Map<const RowMatrix3d> R(reference_->xmat + 9 * id);
+      const RotationMap R_own(reference_->xmat + 9 * MainBody(body)), R(reference_->xmat + 9 * id);
       Eigen::Map<Vector3d>(engine_->body_ipos + 3 * id) += R.transpose() * R_own * moved;
       ForgetSameFrame(id);
     }
@@ -220,26 +219,20 @@ class Bodies {
   void AddPoint(size_t body, double mass, const Vector3d& at) {
     Model(body) = Combine({Model(body), MassProperties{.mass = mass, .com = at}});
     const int id = MainBody(body);
-    MassProperties own;
-    own.mass = engine_->body_mass[id];
-    own.com = Eigen::Map<const Vector3d>(engine_->body_ipos + 3 * id);
-    const mjtNum* const iquat = engine_->body_iquat + 4 * id;
-    const Matrix3d R = Eigen::Quaterniond(iquat[0], iquat[1], iquat[2], iquat[3]).toRotationMatrix();
-    own.inertia = R * Eigen::Map<const Vector3d>(engine_->body_inertia + 3 * id).asDiagonal() * R.transpose();
-    const Vector3d point = R_engine_link_[body] * at + p_engine_link_[body];
-    const MassProperties both = Combine({own, MassProperties{.mass = mass, .com = point}});
+    const Pose X_own = ReadPose(engine_->body_ipos + 3 * id, engine_->body_iquat + 4 * id);
+    const Matrix3d R = X_own.linear();
+    const MassProperties own{engine_->body_mass[id], X_own.translation(),
+                             R * MapVector(engine_->body_inertia + 3 * id).asDiagonal() * R.transpose()};
+    const MassProperties both =
+        Combine({own, MassProperties{.mass = mass, .com = X_engine_link_[body] * at}});
     engine_->body_mass[id] = both.mass;
     Eigen::Map<Vector3d>(engine_->body_ipos + 3 * id) = both.com;
     const Eigen::SelfAdjointEigenSolver<Matrix3d> principal(both.inertia);
     Matrix3d axes = principal.eigenvectors();
     if (axes.determinant() < 0.0) axes.col(0) *= -1.0;
-    const Eigen::Quaterniond turned(axes);
     Eigen::Map<Vector3d>(engine_->body_inertia + 3 * id) = principal.eigenvalues();
-    mjtNum* const quat = engine_->body_iquat + 4 * id;
-    quat[0] = turned.w();
-    quat[1] = turned.x();
-    quat[2] = turned.y();
-    quat[3] = turned.z();
+    const Eigen::Quaterniond turned(axes);
+    Eigen::Map<Eigen::Vector4d>(engine_->body_iquat + 4 * id) << turned.w(), turned.vec();
     ForgetSameFrame(id);
   }
 
@@ -288,15 +281,10 @@ class Bodies {
     adapter_->SetPositions(q, reference_->qpos);
     mj_kinematics(engine_, reference_.get());
     for (int i = -1; i < model.num_joints(); ++i) {
-      const int id = MainBody(static_cast<size_t>(i + 1));
-      const Eigen::Map<const RowMatrix3d> R(reference_->xmat + 9 * id);
-      const Eigen::Map<const Vector3d> p(reference_->xpos + 3 * id);
-      const Pose X_BL = kinematics.CalcLinkPose(i);
-      R_engine_link_.emplace_back(R.transpose() * X_BL.linear());
-      p_engine_link_.emplace_back(R.transpose() * (X_BL.translation() - p));
+      const Pose X_Bb = BodyPose(*reference_, MainBody(static_cast<size_t>(i + 1)));
+      X_engine_link_.push_back(X_Bb.inverse() * kinematics.CalcLinkPose(i));
     }
-    R_engine_link_.emplace_back(Matrix3d::Identity());
-    p_engine_link_.emplace_back(Vector3d::Zero());
+    X_engine_link_.push_back(Pose::Identity());
   }
 
   const Adapter* adapter_;
@@ -304,8 +292,7 @@ class Bodies {
   RobotSpec* plant_;
   std::vector<std::string> names_;
   MjDataPtr reference_;
-  std::vector<Matrix3d> R_engine_link_;
-  std::vector<Vector3d> p_engine_link_;
+  std::vector<Pose> X_engine_link_;
 };
 
 /// Gravity as a floor sees it that rises by these angles along x and y.
@@ -373,11 +360,7 @@ void ApplyMismatch(const MismatchOptions& options, std::uint64_t seed, const std
   if (!options.slope.isZero(0.0)) plant->gravity = TiltGravity(plant->gravity, options.slope);
   std::copy_n(plant->gravity.data(), 3, engine->opt.gravity);
 
-  // The engine derives more from masses. The points of its bonds stay where they are.
-  const std::vector<mjtNum> bonds(engine->eq_data, engine->eq_data + mjNEQDATA * engine->neq);
-  const MjDataPtr data = MakeData(*engine);
-  mj_setConst(engine, data.get());
-  std::copy(bonds.begin(), bonds.end(), engine->eq_data);
+  DeriveConstants(engine);
 }
 
 }  // namespace
