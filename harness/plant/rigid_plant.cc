@@ -221,15 +221,12 @@ void RigidPlant::StepRungeKutta() {
   turn = Displace(state_, k3_, h, &stage_);
   Evaluate(stage_, turn, &k4_);
   // k2 becomes the mean.
-  const auto mean = [](const auto& a, const auto& b, const auto& c, const auto& d) {
-    return ((a + 2.0 * b + 2.0 * c + d) / 6.0).eval();
+  const auto average = [this](auto Rate::*part) {
+    k2_.*part = (k1_.*part + 2.0 * k2_.*part + 2.0 * k3_.*part + k4_.*part) / 6.0;
   };
-  k2_.q_dot = (k1_.q_dot + 2.0 * k2_.q_dot + 2.0 * k3_.q_dot + k4_.q_dot) / 6.0;
-  k2_.xi_dot = (k1_.xi_dot + 2.0 * k2_.xi_dot + 2.0 * k3_.xi_dot + k4_.xi_dot) / 6.0;
-  k2_.kappa_dot = (k1_.kappa_dot + 2.0 * k2_.kappa_dot + 2.0 * k3_.kappa_dot + k4_.kappa_dot) / 6.0;
-  k2_.p_dot = mean(k1_.p_dot, k2_.p_dot, k3_.p_dot, k4_.p_dot);
-  k2_.turn_dot = mean(k1_.turn_dot, k2_.turn_dot, k3_.turn_dot, k4_.turn_dot);
-  k2_.V_Bo_dot = mean(k1_.V_Bo_dot, k2_.V_Bo_dot, k3_.V_Bo_dot, k4_.V_Bo_dot);
+  for (VectorXd Rate::*part : {&Rate::q_dot, &Rate::xi_dot, &Rate::kappa_dot}) average(part);
+  for (Vector3d Rate::*part : {&Rate::p_dot, &Rate::turn_dot}) average(part);
+  average(&Rate::V_Bo_dot);
   Displace(state_, k2_, h, &stage_);
   std::swap(state_, stage_);
 }
