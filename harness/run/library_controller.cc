@@ -1,7 +1,6 @@
 #include <dlfcn.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <sys/time.h>
 
 #include <algorithm>
 #include <atomic>
@@ -20,8 +19,6 @@ namespace {
 /// Number of looks of the timer in a time limit. Looks are counted instead of time, so that a process that
 /// was stopped for a while does not fail.
 constexpr int kLooks = 4;
-/// Making a controller and its first look at the robot may take this many times the limit of a step.
-constexpr int kPatience = 10;
 
 /// State that a timer of the process reads.
 struct {
@@ -40,11 +37,8 @@ void LookAtCall(int /*signal*/) {
   if (call % 2 == 1 && timed.looks >= kLooks * timed.patience) FailAtOnce(timed.line);
 }
 
-/// Sets the period of the timer, s; 0 stops it.
-void SetTimer(double seconds) {
-  timeval period{};
-  period.tv_sec = static_cast<time_t>(seconds);
-  period.tv_usec = static_cast<suseconds_t>(1e6 * (seconds - static_cast<double>(period.tv_sec)));
+/// Sets the period of the timer; 0 stops it.
+void SetTimer(const timeval& period) {
   const itimerval timer{.it_interval = period, .it_value = period};
   ::setitimer(ITIMER_REAL, &timer, nullptr);
 }
@@ -84,7 +78,6 @@ class ForeignLibrary {
   /// Watches the calls as long as there are libraries.
   struct Timer {
     explicit Timer(const OwnControllerSetup& setup) {
-      constexpr double kShortest = 1e-6;  // s; a timer of 0 never looks
       ++timed.libraries;
       timed.line =
           setup.name + ": did not return in time (" + FormatNumber(setup.own().time_limit) + " s for a step)";
@@ -92,10 +85,10 @@ class ForeignLibrary {
       action.sa_handler = LookAtCall;
       action.sa_flags = SA_RESTART;
       ::sigaction(SIGALRM, &action, nullptr);
-      SetTimer(std::max(kShortest, setup.own().time_limit / kLooks));
+      SetTimer(ToTime(setup.own().time_limit / kLooks));
     }
     ~Timer() {
-      if (--timed.libraries == 0) SetTimer(0.0);
+      if (--timed.libraries == 0) SetTimer({});
     }
     Timer(const Timer&) = delete;
     Timer& operator=(const Timer&) = delete;

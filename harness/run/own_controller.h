@@ -2,6 +2,8 @@
 
 // Controllers of the user's own: shared libraries, Python files and programs.
 
+#include <sys/time.h>
+
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -36,6 +38,11 @@ std::filesystem::path FindControllerFile(const OwnControllerOptions& own);
 std::string HashController(const OwnControllerOptions& own);
 
 // Hosts of controllers of the user's own: a library in C++, a library in C, a program.
+
+/// Factor of the time limit for a controller's start, and for a library's begin.
+inline constexpr int kPatience = 10;
+/// At least a microsecond: timers take 0 for none.
+timeval ToTime(double seconds);
 
 /// Inputs of a controller of the user's own.
 struct OwnControllerSetup {

@@ -19,21 +19,11 @@
 namespace dexcheck {
 namespace {
 
-// Factor of the time limit for the start of a program.
-constexpr double kGreetingFraction = 10.0;
 // Time in which a program that has closed its output may end, s.
 constexpr double kEndTime = 0.5;
 // Time of waiting awake, if the last wait was over by then: to sleep and be woken by another core takes
 // longer than many laws. After a longer wait the law is slow, or its process waits for a core.
 constexpr std::chrono::microseconds kAwake(300);
-
-timeval ToTime(double seconds) {
-  timeval time{};
-  time.tv_sec = static_cast<time_t>(seconds);
-  time.tv_usec = static_cast<suseconds_t>(1e6 * (seconds - static_cast<double>(time.tv_sec)));
-  if (time.tv_sec == 0 && time.tv_usec == 0) time.tv_usec = 1;  // 0 would wait for ever
-  return time;
-}
 
 class ProgramPeer final : public ControllerPeer {
  public:
@@ -44,7 +34,7 @@ class ProgramPeer final : public ControllerPeer {
     } else {
       Start(std::move(words));
     }
-    SetTimeLimit(kGreetingFraction * setup_.own().time_limit);
+    SetTimeLimit(kPatience * setup_.own().time_limit);
   }
 
   /// Ends the program, by force when it does not end by itself.
@@ -202,6 +192,14 @@ class ProgramPeer final : public ControllerPeer {
 };
 
 }  // namespace
+
+timeval ToTime(double seconds) {
+  timeval time{};
+  time.tv_sec = static_cast<time_t>(seconds);
+  time.tv_usec = static_cast<suseconds_t>(1e6 * (seconds - static_cast<double>(time.tv_sec)));
+  if (time.tv_sec == 0 && time.tv_usec == 0) time.tv_usec = 1;
+  return time;
+}
 
 std::unique_ptr<ControllerPeer> MakeProgramPeer(const OwnControllerSetup& setup,
                                                 std::vector<std::string> words) {
