@@ -55,7 +55,4 @@ void RequireExtension(const std::filesystem::path& path, const char* extension);
 /// @throws InputError "PATH: cannot be written: reason", or as RequireExtension.
 void WritePng(const std::filesystem::path& path, const Image& image);
 
-/// @throws InputError "PATH: cannot be read: reason".
-Image ReadPng(const std::filesystem::path& path);
-
 }  // namespace dexcheck

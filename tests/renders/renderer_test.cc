@@ -15,6 +15,7 @@
 #include "tests/common/paths.h"
 #include "tests/common/throws.h"
 #include "tests/renders/kinematic_run.h"
+#include "tests/renders/read_png.h"
 
 namespace dexcheck::testing::renderer_test {
 namespace {

@@ -13,6 +13,7 @@
 #include "tests/common/run_program.h"
 #include "tests/common/throws.h"
 #include "tests/renders/decode.h"
+#include "tests/renders/read_png.h"
 
 namespace dexcheck::testing::video_writer_test {
 namespace {

@@ -7,6 +7,7 @@
 #include "renders/video.h"
 #include "tests/harness/cli/dexcheck_program.h"
 #include "tests/harness/report/replay_run.h"
+#include "tests/renders/read_png.h"
 
 namespace dexcheck::testing::render_command_test {
 namespace {
