@@ -42,10 +42,7 @@ class MotionFigures {
     AddPlatform();
     AddTorques();
     AddForces();
-    AddErrors();
-    AddTorqueUse();
-    AddFrictionUse();
-    AddContactDrift();
+    AddMeasures();
     if (!run_.is_papers()) {
       for (Figure& figure : figures_) figure.panel.clear();
     }
@@ -134,17 +131,14 @@ class MotionFigures {
 
   void AddPlatform() {
     if (!Has("q") || run_.Find("q")->columns.size() < 3 || run_.Find("q")->columns[2] != "phi") return;
-    const RowMatrixXd q = Read("q");
-    Add({.name = "fig12c",
-         .panel = "12 (c)",
-         .title = "Motion of the mobile platform",
-         .label = "position (m)",
-         .right_label = "heading (rad)",
-         .least_span = kLeastSpan,
-         .curves = {{.label = "x_c (m)", .values = q.col(0)},
-                    {.label = "y_c (m)", .values = q.col(1), .color = 1},
-                    {.label = "φ (rad)", .values = q.col(2), .color = 2, .dash = 1, .right_axis = true}},
-         .printed = true});
+    AddOf({.name = "fig12c",
+           .panel = "12 (c)",
+           .title = "Motion of the mobile platform",
+           .label = "position (m)",
+           .right_label = "heading (rad)",
+           .least_span = kLeastSpan,
+           .printed = true},
+          {{"q", 0, "x_c (m)"}, {"q", 1, "y_c (m)"}, {"q", 2, "φ (rad)", 1, true}});
   }
 
   /// A joint grasps where it is one of the fingers that hold the object. They are distinguished by what
@@ -263,69 +257,63 @@ class MotionFigures {
     }
   }
 
-  void AddErrors() {
-    if (!Has("object/position_error") || !Has("object/orientation_error")) return;
-    Add({.name = "tracking_error",
+  /// The source of curves: a column of a signal, or all of them (-1).
+  struct Columns {
+    const char* signal;
+    int column;
+    std::string label;  ///< Of all columns what follows their names.
+    int dash = 0;
+    bool right_axis = false;
+  };
+
+  /// Adds a figure of those that were recorded.
+  void AddOf(Figure figure, const std::vector<Columns>& all) {
+    for (const Columns& one : all) {
+      if (!Has(one.signal)) continue;
+      const bool is_one = one.column >= 0;
+      const RowMatrixXd values = Read(one.signal);
+      const int first = static_cast<int>(figure.curves.size());
+      for (int k = std::max(one.column, 0); k < (is_one ? one.column + 1 : WidthOf(one.signal)); ++k)
+        figure.curves.push_back({.label = is_one ? one.label : NameColumn(one.signal, k) + one.label,
+                                 .values = values.col(k),
+                                 .color = one.dash > 0 ? k : first + (is_one ? 0 : k),
+                                 .dash = one.dash,
+                                 .right_axis = one.right_axis});
+    }
+    Add(std::move(figure));
+  }
+
+  void AddMeasures() {
+    AddOf(
+        {.name = "tracking_error",
          .title = "Error of the object against its desired motion",
          .label = "error (m, rad)",
          .log = true,
          .answers = true,
-         .curves = {{.label = "position (m)", .values = Read("object/position_error").col(0)},
-                    {.label = "orientation (rad)",
-                     .values = Read("object/orientation_error").col(0),
-                     .color = 1}},
-         .printed = true});
-  }
-
-  /// Adds a curve for each column of a signal, if it was recorded.
-  void AddColumns(const char* signal, const std::string& what, int first_color, int dash, bool right_axis,
-                  Figure* figure) const {
-    if (!Has(signal)) return;
-    const RowMatrixXd values = Read(signal);
-    for (int k = 0; k < WidthOf(signal); ++k) {
-      figure->curves.push_back({.label = NameColumn(signal, k) + what,
-                                .values = values.col(k),
-                                .color = first_color + k,
-                                .dash = dash,
-                                .right_axis = right_axis});
-    }
-  }
-
-  void AddTorqueUse() {
-    constexpr const char* kEffort = "check/actuator_effort";
-    if (!Has(kEffort)) return;
-    Add({.name = "torque_use",
-         .title = "Largest torque as a fraction of its motor's limit",
-         .label = "|τ| / limit",
-         .least_span = 0.1,
-         .bound = 1.0,
-         .answers = true,
-         .curves = {{.label = "largest of all motors", .values = Read(kEffort).col(0)}}});
-  }
-
-  void AddFrictionUse() {
-    Figure figure{.name = "friction_use",
-                  .title = "Tangential force as a fraction of what friction can hold",
-                  .label = "|f_t| / (μ f_n)",
-                  .least_span = 0.1,
-                  .bound = 1.0,
-                  .answers = true};
-    AddColumns("contact/cone_use", "", 0, 0, false, &figure);
-    AddColumns("wheel/cone_use", "", static_cast<int>(figure.curves.size()), 0, false, &figure);
-    Add(figure);
-  }
-
-  /// How far contacts that the law follows by (40) are from where they are.
-  void AddContactDrift() {
-    Figure figure{.name = "contact_drift",
-                  .title = "Contacts followed by (40) against where they are",
-                  .label = "points on object and fingertip (m)",
-                  .right_label = "psi (rad)",
-                  .log = true};
-    AddColumns("contact/drift_object", " on the object", 0, 0, false, &figure);
-    AddColumns("contact/drift_fingertip", " on the fingertip", 0, 1, false, &figure);
-    AddColumns("contact/drift_psi", " psi", 0, 2, true, &figure);
-    Add(figure);
+         .printed = true},
+        {{"object/position_error", 0, "position (m)"}, {"object/orientation_error", 0, "orientation (rad)"}});
+    AddOf({.name = "torque_use",
+           .title = "Largest torque as a fraction of its motor's limit",
+           .label = "|τ| / limit",
+           .least_span = 0.1,
+           .bound = 1.0,
+           .answers = true},
+          {{"check/actuator_effort", 0, "largest of all motors"}});
+    AddOf({.name = "friction_use",
+           .title = "Tangential force as a fraction of what friction can hold",
+           .label = "|f_t| / (μ f_n)",
+           .least_span = 0.1,
+           .bound = 1.0,
+           .answers = true},
+          {{"contact/cone_use", -1, ""}, {"wheel/cone_use", -1, ""}});
+    AddOf({.name = "contact_drift",  // of contacts that the law follows by (40)
+           .title = "Contacts followed by (40) against where they are",
+           .label = "points on object and fingertip (m)",
+           .right_label = "psi (rad)",
+           .log = true},
+          {{"contact/drift_object", -1, " on the object"},
+           {"contact/drift_fingertip", -1, " on the fingertip", 1},
+           {"contact/drift_psi", -1, " psi", 2, true}});
   }
 
   const RunData& run_;
