@@ -26,22 +26,24 @@ struct Row {
   int faults = 0, cause_right = 0, part_named = 0, with_part = 0;
   std::array<int, kOutcomes.size()> outcomes{};
 
-  void Add(const CampaignFault& fault) {
+  void Add(const Json& fault) {
     ++faults;
-    ++outcomes[static_cast<size_t>(fault.outcome)];
-    cause_right += fault.cause_right ? 1 : 0;
-    with_part += fault.part_named ? 1 : 0;
-    part_named += fault.part_named.value_or(false) ? 1 : 0;
+    const auto outcome = std::ranges::find(kOutcomes, fault.at("outcome").get<std::string>());
+    ++outcomes.at(static_cast<size_t>(outcome - kOutcomes.begin()));
+    cause_right += fault.at("cause_right").get<bool>() ? 1 : 0;
+    with_part += fault.contains("part_named") ? 1 : 0;
+    part_named += fault.value("part_named", false) ? 1 : 0;
   }
 };
 
 /// One for each kind, and one for all.
-std::vector<Row> SumUp(const std::vector<CampaignFault>& faults) {
+std::vector<Row> SumUp(const std::vector<Json>& faults) {
   std::vector<Row> rows;
   Row all{.kind = "all"};
-  for (const CampaignFault& fault : faults) {
-    auto row = std::ranges::find(rows, fault.kind, &Row::kind);
-    if (row == rows.end()) row = rows.insert(rows.end(), Row{.kind = fault.kind});
+  for (const Json& fault : faults) {
+    const std::string kind = fault.at("kind");
+    auto row = std::ranges::find(rows, kind, &Row::kind);
+    if (row == rows.end()) row = rows.insert(rows.end(), Row{.kind = kind});
     row->Add(fault);
     all.Add(fault);
   }
@@ -49,33 +51,16 @@ std::vector<Row> SumUp(const std::vector<CampaignFault>& faults) {
   return rows;
 }
 
-Json ToJson(const CampaignFault& fault) {
-  Json json = {{"kind", fault.kind},
-               {"name", fault.name},
-               {"outcome", kOutcomes[static_cast<size_t>(fault.outcome)]},
-               {"cause_right", fault.cause_right},
-               {"remark", fault.exception}};
-  if (fault.part_named) json["part_named"] = *fault.part_named;
-  json.update(fault.details);
-  return json;
-}
-
-constexpr const char* kOwnKeys[] = {"kind", "name", "outcome", "cause_right", "part_named", "remark"};
-
-CampaignFault ReadFault(const Json& json) {
-  CampaignFault fault{.kind = json.at("kind"), .name = json.at("name")};
-  const std::string outcome = json.at("outcome");
-  fault.outcome = static_cast<MutantOutcome>(std::find(kOutcomes.begin(), kOutcomes.end() - 1, outcome) -
-                                             kOutcomes.begin());
-  fault.cause_right = json.at("cause_right");
-  if (json.contains("part_named")) fault.part_named = json["part_named"].get<bool>();
-  fault.exception = json.at("remark");
-  fault.details = json;
-  for (const char* key : kOwnKeys) fault.details.erase(key);
-  return fault;
-}
-
 }  // namespace
+
+Json MakeFaultResult(const std::string& kind, const std::string& name, MutantOutcome outcome,
+                     bool cause_right, const std::string& remark) {
+  return {{"kind", kind},
+          {"name", name},
+          {"outcome", kOutcomes[static_cast<size_t>(outcome)]},
+          {"cause_right", cause_right},
+          {"remark", remark}};
+}
 
 void Campaign::Resume(const std::string& json_file, const std::vector<std::filesystem::path>& inputs) {
   std::string texts;
@@ -90,20 +75,22 @@ void Campaign::Resume(const std::string& json_file, const std::vector<std::files
   for (const auto& [key, value] : head.items())
     if (!json.contains(key) || json[key] != value) return;
   try {
-    for (const Json& fault : json.at("faults")) faults.push_back(ReadFault(fault));
-  } catch (const Json::exception&) {
+    faults = json.at("faults").get<std::vector<Json>>();
+    for (const Json& fault : faults) static_cast<void>(fault.at("remark").get<std::string>());
+    SumUp(faults);
+  } catch (const std::exception&) {  // not one of these
     faults.clear();
   }
   if (!faults.empty())
     fmt::print(stderr, "{} of {} faults are in {} already\n", faults.size(), total, json_file);
 }
 
-void Campaign::Make(std::uint64_t jobs, bool quiet, const std::function<CampaignFault(size_t fault)>& make) {
+void Campaign::Make(std::uint64_t jobs, bool quiet, const std::function<Json(size_t fault)>& make) {
   const size_t done = faults.size();
   ProgressBar bar("changing", static_cast<long>(total), quiet);
-  const auto run = [&](size_t i) { return FormatJson(ToJson(make(done + i))); };
+  const auto run = [&](size_t i) { return FormatJson(make(done + i)); };
   const auto take = [&](size_t /*i*/, const std::string& result) {
-    faults.push_back(ReadFault(Json::parse(result)));
+    faults.push_back(Json::parse(result));
     bar.Update(static_cast<long>(faults.size()));
   };
   RunJobs("a fault", total - done, CountJobs(jobs), run, take, IsInterrupted);
@@ -145,10 +132,10 @@ Report Campaign::MakeReport() const {
                                       {"part_named", row.part_named}, {"with_a_part", row.with_part}};
   }
   report.AddTable("<>>>>>>>", table);
-  report.data["faults"] = Json::array();
-  for (const CampaignFault& fault : faults) {
-    report.data["faults"].push_back(ToJson(fault));
-    if (!fault.exception.empty()) report.Add(fault.exception);
+  report.data["faults"] = faults;
+  for (const Json& fault : faults) {
+    const std::string remark = fault.at("remark");
+    if (!remark.empty()) report.Add(remark);
   }
   return report;
 }

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,22 +14,17 @@
 
 namespace dexcheck::cli {
 
-/// A fault that was made.
-struct CampaignFault {
-  std::string kind;  ///< What the table sums up by.
-  std::string name;
-  MutantOutcome outcome = MutantOutcome::kSurvived;
-  bool cause_right = false;        ///< The first cause that is named is the fault.
-  std::optional<bool> part_named;  ///< Whether its part is named, too; none without a part.
-  std::string exception;           ///< What is said of it besides, in a line; empty when all went well.
-  Json details = Json::object();   ///< In the JSON, besides the above.
-};
+/// A fault that was made, as the JSON has it. @param kind what the table sums up by. @param cause_right
+/// whether the first cause that is named is the fault. @param remark in a line; empty when all went well.
+Json MakeFaultResult(const std::string& kind, const std::string& name, MutantOutcome outcome,
+                     bool cause_right, const std::string& remark);
 
 /// A campaign so far.
 struct Campaign {
-  std::vector<CampaignFault> faults;  ///< That were made.
-  size_t total = 0;                   ///< To be made.
-  bool names_causes = true;           ///< Whether causes were looked for.
+  /// That were made, as MakeFaultResult has them; with "part_named" where one has a part that may be named.
+  std::vector<Json> faults;
+  size_t total = 0;          ///< To be made.
+  bool names_causes = true;  ///< Whether causes were looked for.
 
   Json head = Json::object();  ///< Of the JSON: what the campaign was asked for.
 
@@ -39,7 +33,7 @@ struct Campaign {
   void Resume(const std::string& json_file, const std::vector<std::filesystem::path>& inputs);
   /// Makes the others, so many at a time as CountJobs says, with a progress bar, until the user interrupts.
   /// @param make makes one in a process of its own. @throws Error when such a process dies.
-  void Make(std::uint64_t jobs, bool quiet, const std::function<CampaignFault(size_t fault)>& make);
+  void Make(std::uint64_t jobs, bool quiet, const std::function<Json(size_t fault)>& make);
   /// Returns the verdict, a line for each kind of fault and the exceptions. The data are `head`, "complete",
   /// "kinds" and "faults", from which Resume goes on.
   [[nodiscard]] Report MakeReport() const;

@@ -31,38 +31,32 @@ struct MutateRequest : Outputs {
   bool no_diagnosis = false;
 };
 
-CampaignFault Describe(const TriedFault& tried) {
-  CampaignFault fault{
-      .kind = tried.kind, .name = tried.name, .outcome = tried.outcome, .cause_right = tried.named_first};
-  if (tried.outcome == MutantOutcome::kSurvived) fault.exception = "survived: " + tried.name;
-  if (tried.outcome == MutantOutcome::kNoEffect) fault.exception = "no effect: " + tried.name;
-  fault.details = {{"failed_checks", tried.failed_checks}};
+/// @param missed what is said of a fault that was found, and is not the first cause.
+Json Describe(const TriedFault& tried, const std::string& missed) {
+  const bool is_missed = tried.outcome == MutantOutcome::kKilled && !tried.named_first;
+  Json fault = MakeFaultResult(tried.kind, tried.name, tried.outcome, tried.named_first,
+                               tried.outcome == MutantOutcome::kSurvived   ? "survived: " + tried.name
+                               : tried.outcome == MutantOutcome::kNoEffect ? "no effect: " + tried.name
+                               : is_missed                                 ? missed
+                                                                           : "");
+  fault["failed_checks"] = tried.failed_checks;
   return fault;
 }
 
-bool IsMissed(const TriedFault& tried) {
-  return tried.outcome == MutantOutcome::kKilled && !tried.named_first;
-}
-
-CampaignFault Describe(const Mutant& mutant, bool diagnosed) {
-  CampaignFault fault = Describe(static_cast<const TriedFault&>(mutant));
-  if (diagnosed && IsMissed(mutant)) {
-    fault.exception = fmt::format("cause: {} ({}): named {}{}", mutant.name, mutant.kind,
-                                  mutant.named.empty() ? "nothing" : mutant.named,
-                                  mutant.named_equal ? ", which is listed as equal" : "");
-  }
-  fault.details["named"] = mutant.named;
-  fault.details["named_equal"] = mutant.named_equal;
-  fault.details["explained"] = mutant.explained;
+Json Describe(const Mutant& mutant, bool diagnosed) {
+  const std::string missed = fmt::format("cause: {} ({}): named {}{}", mutant.name, mutant.kind,
+                                         mutant.named.empty() ? "nothing" : mutant.named,
+                                         mutant.named_equal ? ", which is listed as equal" : "");
+  Json fault = Describe(static_cast<const TriedFault&>(mutant), diagnosed ? missed : "");
+  fault["named"] = mutant.named;
+  fault["named_equal"] = mutant.named_equal;
+  fault["explained"] = mutant.explained;
   return fault;
 }
 
-CampaignFault Describe(const FormulaMutant& mutant) {
-  CampaignFault fault = Describe(static_cast<const TriedFault&>(mutant));
-  if (IsMissed(mutant))
-    fault.exception = fmt::format("cause: {}: expected {}, failed {}", mutant.name, mutant.equation.term,
-                                  mutant.failed_checks);
-  return fault;
+Json Describe(const FormulaMutant& mutant) {
+  return Describe(mutant, fmt::format("cause: {}: expected {}, failed {}", mutant.name, mutant.equation.term,
+                                      mutant.failed_checks));
 }
 
 /// Makes faults in two descriptions.
@@ -130,33 +124,34 @@ std::string DescribeException(const RunMutant& mutant) {
   return fmt::format("{}: {}: {}", outcome, name, mutant.causes);
 }
 
-CampaignFault Describe(const RunMutant& mutant) {
-  CampaignFault fault{.kind = mutant.all.kind, .name = mutant.all.name};
-  fault.outcome = mutant.refused     ? MutantOutcome::kRefused
-                  : mutant.no_effect ? MutantOutcome::kNoEffect
-                  : mutant.killed    ? MutantOutcome::kKilled
-                                     : MutantOutcome::kSurvived;
+Json Describe(const RunMutant& mutant) {
+  const MutantOutcome outcome = mutant.refused     ? MutantOutcome::kRefused
+                                : mutant.no_effect ? MutantOutcome::kNoEffect
+                                : mutant.killed    ? MutantOutcome::kKilled
+                                                   : MutantOutcome::kSurvived;
   const bool counts = !mutant.refused && !mutant.no_effect;
-  fault.cause_right = counts && (mutant.faults.size() > 1 ? mutant.is_named() : mutant.has_right_cause());
-  if (counts && !(mutant.all.truth.empty() && mutant.all.part.empty())) fault.part_named = mutant.is_named();
-  fault.exception = DescribeException(mutant);
-  fault.details = {{"expected_cause", NameOf(mutant.all.cause)},
-                   {"cause", NameOf(mutant.cause)},
-                   {"expected_part", mutant.all.part},
-                   {"evidence", mutant.evidence},
-                   {"failure", mutant.failure},
-                   {"failed_checks", mutant.failed_checks},
-                   {"position_error_max_m", mutant.position_error},
-                   {"causes", mutant.causes},
-                   {"right", mutant.score.right},
-                   {"in_class", mutant.score.in_class},
-                   {"not_explained", mutant.score.not_explained},
-                   {"wrong", mutant.score.wrong},
-                   {"as_alone", mutant.is_as_alone()}};
+  const bool is_right = mutant.faults.size() > 1 ? mutant.is_named() : mutant.has_right_cause();
+  Json fault = MakeFaultResult(mutant.all.kind, mutant.all.name, outcome, counts && is_right,
+                               DescribeException(mutant));
+  if (counts && !(mutant.all.truth.empty() && mutant.all.part.empty()))
+    fault["part_named"] = mutant.is_named();
+  fault.update({{"expected_cause", NameOf(mutant.all.cause)},
+                {"cause", NameOf(mutant.cause)},
+                {"expected_part", mutant.all.part},
+                {"evidence", mutant.evidence},
+                {"failure", mutant.failure},
+                {"failed_checks", mutant.failed_checks},
+                {"position_error_max_m", mutant.position_error},
+                {"causes", mutant.causes},
+                {"right", mutant.score.right},
+                {"in_class", mutant.score.in_class},
+                {"not_explained", mutant.score.not_explained},
+                {"wrong", mutant.score.wrong},
+                {"as_alone", mutant.is_as_alone()}});
   for (size_t i = 0; i < mutant.truth.size(); ++i)
-    fault.details["names"].push_back({{"injected", mutant.truth[i].fault},
-                                      {"place", mutant.truth[i].place},
-                                      {"named", mutant.score.named_as[i]}});
+    fault["names"].push_back({{"injected", mutant.truth[i].fault},
+                              {"place", mutant.truth[i].place},
+                              {"named", mutant.score.named_as[i]}});
   return fault;
 }
 
@@ -168,14 +163,14 @@ std::string DescribeScores(const Campaign& campaign, int together) {
     int sets = 0, all_right = 0, as_alone = 0, of[4] = {};
   };
   std::map<int, Count> counts;
-  for (const CampaignFault& fault : campaign.faults) {
-    if (fault.outcome != MutantOutcome::kKilled) continue;
+  for (const Json& fault : campaign.faults) {
+    if (fault.at("outcome") != "found") continue;
     int of[std::size(kNames)] = {};
-    for (size_t k = 0; k < std::size(kNames); ++k) of[k] = fault.details[kNames[k]].get<int>();
+    for (size_t k = 0; k < std::size(kNames); ++k) of[k] = fault.at(kNames[k]).get<int>();
     Count& count = counts[of[0] + of[1] + of[2]];
     ++count.sets;
     count.all_right += static_cast<int>(of[1] + of[2] + of[3] == 0);
-    count.as_alone += static_cast<int>(fault.details["as_alone"].get<bool>());
+    count.as_alone += static_cast<int>(fault.at("as_alone").get<bool>());
     for (size_t k = 0; k < std::size(kNames); ++k) count.of[k] += of[k];
   }
   std::string text;
