@@ -22,7 +22,12 @@ namespace {
 constexpr int kWait = 100;  // ms
 constexpr size_t kChunk = 1 << 16;
 
-/// A message is its length and its bytes, as PackBytes makes them.
+/// A message is its length and its bytes.
+bool SendMessage(int channel, const std::string& bytes) {
+  const size_t length = bytes.size();
+  return Send(channel, std::string(reinterpret_cast<const char*>(&length), sizeof length) + bytes);
+}
+
 /// @returns a whole message from the front of what was received; none while it is not whole.
 std::optional<std::string> TakeMessage(std::string* received) {
   size_t length = 0;
@@ -79,7 +84,7 @@ bool ProcessPool::Work(int channel, int messages) const {
       std::fflush(stderr);
       // Messages of an earlier job are cleared; a failure to do so only affects messages.
       if (::ftruncate(messages, 0) == 0) ::lseek(messages, 0, SEEK_SET);
-      if (!Send(channel, PackBytes(run_(*request)))) return false;
+      if (!SendMessage(channel, run_(*request))) return false;
     }
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
@@ -107,7 +112,7 @@ void ProcessPool::Start(long number, const std::string& request) {
       workers_.push_back(MakeWorker());
       idle = workers_.end() - 1;
     }
-    if (!Send(idle->process.channel(), PackBytes(request))) {
+    if (!SendMessage(idle->process.channel(), request)) {
       workers_.erase(idle);  // it was killed while it had nothing to do
       continue;
     }
@@ -179,9 +184,9 @@ size_t RunJobs(const std::string& what, size_t count, int size,
     size_t job = 0;
     UnpackBytes(request, &job);
     try {
-      return PackBytes(true, run(job));
+      return "+" + run(job);
     } catch (const InputError& error) {
-      return PackBytes(false, std::string(error.what()));
+      return std::string("-") + error.what();
     }
   });
   std::map<size_t, std::string> early;  // results of jobs behind one that is not done
@@ -194,9 +199,8 @@ size_t RunJobs(const std::string& what, size_t count, int size,
     early.emplace(ended->number, std::move(*ended->result));
     for (auto next = early.find(taken); next != early.end() && !is_interrupted();
          next = early.find(++taken)) {
-      bool is_done = false;
-      std::string result;
-      UnpackBytes(next->second, &is_done, &result);
+      const bool is_done = next->second.starts_with('+');
+      const std::string result = next->second.substr(1);
       early.erase(next);
       if (!is_done) throw InputError(result);
       take(taken, result);
