@@ -18,10 +18,8 @@ namespace {
 using Columns = std::vector<std::vector<double>>;
 
 /// An array with its rows along the first index.
-struct NamedArray {
+struct NamedArray : NpyArray {
   std::string name;
-  std::vector<std::uint64_t> shape;
-  std::vector<double> values;
 };
 
 [[noreturn]] void Fail(const std::filesystem::path& path, const std::string& problem) {
@@ -31,13 +29,12 @@ struct NamedArray {
 /// Arrays with as many rows as most of them; "q[3]" of one with several columns.
 std::unique_ptr<RecordingReader> MakeReader(const std::filesystem::path& path, const std::string& format,
                                             const std::vector<NamedArray>& arrays) {
-  std::map<std::uint64_t, int> lengths;
+  std::map<size_t, int> lengths;
   for (const NamedArray& array : arrays) ++lengths[array.shape.front()];
   if (lengths.empty()) Fail(path, "has no arrays of numbers");
-  const std::uint64_t rows =
-      std::max_element(lengths.begin(), lengths.end(), [](const auto& a, const auto& b) {
-        return std::pair(a.second, a.first) < std::pair(b.second, b.first);
-      })->first;
+  const size_t rows = std::max_element(lengths.begin(), lengths.end(), [](const auto& a, const auto& b) {
+                        return std::pair(a.second, a.first) < std::pair(b.second, b.first);
+                      })->first;
   std::vector<std::string> names;
   Columns columns;
   for (const NamedArray& array : arrays) {
@@ -54,8 +51,7 @@ std::unique_ptr<RecordingReader> MakeReader(const std::filesystem::path& path, c
 }
 
 NamedArray ToArray(const std::string& name, const std::filesystem::path& path, std::string_view bytes) {
-  const NpyArray npy = ParseNpy(bytes, path.string() + (name.empty() ? "" : ": " + name));
-  return {name, {npy.shape.begin(), npy.shape.end()}, npy.values};
+  return {ParseNpy(bytes, path.string() + (name.empty() ? "" : ": " + name)), name};
 }
 
 std::vector<NamedArray> ReadZip(const std::filesystem::path& path) {
@@ -86,15 +82,9 @@ std::vector<NamedArray> ReadZip(const std::filesystem::path& path) {
 std::vector<NamedArray> ListArrays(const std::filesystem::path& path) {
   const hdf5::SilencedErrors silenced;
   const hdf5::File file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
-  std::vector<std::string> names;
-  const auto visit = [](hid_t, const char* name, const H5O_info_t* info, void* out) noexcept -> herr_t {
-    if (info->type == H5O_TYPE_DATASET) static_cast<std::vector<std::string>*>(out)->emplace_back(name);
-    return 0;
-  };
-  hdf5::Check(H5Ovisit2(file.id(), H5_INDEX_NAME, H5_ITER_INC, visit, &names, H5O_INFO_BASIC));
   std::vector<NamedArray> arrays;
   std::uintmax_t room = MostUnpacked(SizeOf(path)) / sizeof(double);
-  for (const std::string& name : names) {
+  for (const std::string& name : hdf5::ListDatasets(file.id())) {
     const hdf5::Dataset set(H5Dopen2(file.id(), name.c_str(), H5P_DEFAULT));
     const hdf5::Datatype type(H5Dget_type(set.id()));
     const hdf5::Dataspace space(H5Dget_space(set.id()));
@@ -106,8 +96,7 @@ std::vector<NamedArray> ListArrays(const std::filesystem::path& path) {
     if (extents[1] != 0 && extents[0] > room / extents[1])
       Fail(path, name + ": is longer than its file can hold");
     room -= extents[0] * extents[1];
-    NamedArray array = {name, {extents[0]}, std::vector<double>(extents[0] * extents[1])};
-    if (rank == 2) array.shape.push_back(extents[1]);
+    NamedArray array{{{extents, extents + rank}, std::vector<double>(extents[0] * extents[1])}, name};
     hdf5::Check(H5Dread(set.id(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.values.data()));
     arrays.push_back(std::move(array));
   }

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace dexcheck::hdf5 {
 
@@ -100,6 +101,20 @@ inline Datatype MakeStringType() {
   Check(H5Tset_size(type.id(), H5T_VARIABLE));
   Check(H5Tset_cset(type.id(), H5T_CSET_UTF8));
   return type;
+}
+
+/// All datasets, with their groups: "object/X_o".
+inline std::vector<std::string> ListDatasets(hid_t file) {
+  const auto visit = [](hid_t group, const char* name, const H5L_info_t* link, void* out) noexcept -> herr_t {
+    H5O_info_t object;
+    if (link->type != H5L_TYPE_HARD) return 0;
+    if (H5Oget_info_by_name2(group, name, &object, H5O_INFO_BASIC, H5P_DEFAULT) < 0) return -1;
+    if (object.type == H5O_TYPE_DATASET) static_cast<std::vector<std::string>*>(out)->emplace_back(name);
+    return 0;
+  };
+  std::vector<std::string> names;
+  Check(H5Lvisit(file, H5_INDEX_NAME, H5_ITER_INC, visit, &names));
+  return names;
 }
 
 }  // namespace dexcheck::hdf5

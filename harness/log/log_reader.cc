@@ -59,20 +59,6 @@ std::vector<std::string> ListAttributes(hid_t object) {
   return names;
 }
 
-/// All datasets, with their groups: "object/X_o".
-std::vector<std::string> ListDatasets(hid_t file) {
-  const auto visit = [](hid_t group, const char* name, const H5L_info_t* link, void* out) noexcept -> herr_t {
-    H5O_info_t object;
-    if (link->type != H5L_TYPE_HARD) return 0;
-    if (H5Oget_info_by_name2(group, name, &object, H5O_INFO_BASIC, H5P_DEFAULT) < 0) return -1;
-    if (object.type == H5O_TYPE_DATASET) static_cast<std::vector<std::string>*>(out)->emplace_back(name);
-    return 0;
-  };
-  std::vector<std::string> names;
-  Check(H5Lvisit(file, H5_INDEX_NAME, H5_ITER_INC, visit, &names));
-  return names;
-}
-
 struct DatasetShape {
   hdf5::Datatype type;
   std::vector<hsize_t> extents;  // none of a single value
@@ -181,7 +167,7 @@ class LogReader::File {
     if (signals_.empty()) throw std::runtime_error("it has no signals");
     const hdf5::Group meta(H5Gopen2(file_.id(), "meta", H5P_DEFAULT));
     for (const std::string& name : ListAttributes(meta.id())) texts_[name] = ReadString(meta.id(), name);
-    for (const std::string& name : ListDatasets(file_.id())) AddFile(name);
+    for (const std::string& name : hdf5::ListDatasets(file_.id())) AddFile(name);
     if (is_old_) RenameTexts();
   }
 
