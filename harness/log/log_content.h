@@ -94,12 +94,16 @@ void CopyBytes(const std::string& name, int from, std::uint64_t from_offset, int
 inline constexpr const char* kFormatAttribute = "format";
 inline constexpr const char* kLogFormat = "dexcheck log 2";
 
+/// A log's file, open for reading and writing.
+struct LogFile : FileDescriptor {
+  std::vector<std::uint64_t> offsets;  ///< Of each signal's first row, from the file's begin; 0 without rows.
+};
+
 /// Writes a log with room for `rows` rows of each signal; times are NaN, which marks rows not written, other
 /// numbers zero. `path` must exist.
 /// @param name in messages.
-/// @returns where each signal's first row lies, from the file's begin; 0 without rows.
 /// @throws InputError when the file cannot be written.
-std::vector<std::uint64_t> WriteLogFile(const std::filesystem::path& path, const std::string& name,
-                                        const LogContent& content, long rows);
+LogFile WriteLogFile(const std::filesystem::path& path, const std::string& name, const LogContent& content,
+                     long rows);
 
 }  // namespace dexcheck

@@ -186,8 +186,8 @@ void CopyBytes(const std::string& name, int from, std::uint64_t from_offset, int
   }
 }
 
-std::vector<std::uint64_t> WriteLogFile(const std::filesystem::path& path, const std::string& name,
-                                        const LogContent& content, long rows) {
+LogFile WriteLogFile(const std::filesystem::path& path, const std::string& name, const LogContent& content,
+                     long rows) {
   std::vector<std::uint64_t> offsets;
   try {
     // HDF5 cannot close a file on a full disk, and without this would crash over it at the program's end.
@@ -196,11 +196,10 @@ std::vector<std::uint64_t> WriteLogFile(const std::filesystem::path& path, const
   } catch (const hdf5::Hdf5Error& error) {
     throw InputError(name + ": cannot be written: " + error.what());
   }
-  FileDescriptor file(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  LogFile file{FileDescriptor(::open(path.c_str(), O_RDWR | O_CLOEXEC)), std::move(offsets)};
   if (!file.is_open()) FailToWrite(name, errno);
-  MarkAllRowsUnwritten(name, file.get(), offsets.front(), rows);
-  if (const int error = file.Close(); error != 0) FailToWrite(name, error);
-  return offsets;
+  MarkAllRowsUnwritten(name, file.get(), file.offsets.front(), rows);
+  return file;
 }
 
 }  // namespace dexcheck

@@ -85,12 +85,6 @@ void LogWriter::RequireNoFile() const {
 
 void LogWriter::Fail(int error) const { FailToWrite(name_, error); }
 
-FileDescriptor LogWriter::Open(const PartialFile& partial) const {
-  FileDescriptor file(::open(partial.partial().c_str(), O_RDWR | O_CLOEXEC));
-  if (!file.is_open()) Fail(errno);
-  return file;
-}
-
 void LogWriter::RequireState(bool condition, const char* call) const {
   if (condition) return;
   if (state_ == State::kFailed) throw InputError(name_ + ": cannot be written: it failed before");
@@ -155,8 +149,7 @@ void LogWriter::StartRows() {
     begin += width * rows_per_flush_;
   }
   PartialFile partial(path_);
-  offsets_ = WriteLogFile(partial.partial(), name_, content_, max_rows_);
-  file_ = Open(partial);
+  file_ = WriteLogFile(partial.partial(), name_, content_, max_rows_);
   RequireNoFile();
   partial.Commit();
   changed_ = false;
@@ -192,7 +185,7 @@ void LogWriter::WriteBufferedRows() {
   for (size_t k = buffers_.size(); k-- > 0;) {
     const size_t row_size = buffers_[k].width * sizeof(double);
     WriteAt(name_, file_.get(), buffers_[k].begin, buffered_rows_ * row_size,
-            offsets_[k] + static_cast<size_t>(flushed_rows_) * row_size);
+            file_.offsets[k] + static_cast<size_t>(flushed_rows_) * row_size);
   }
 }
 
@@ -220,11 +213,10 @@ void LogWriter::Close() {
 /// Builds the final file beside the present one, and replaces it at once.
 void LogWriter::Rewrite() {
   PartialFile partial(path_);
-  const std::vector<std::uint64_t> offsets = WriteLogFile(partial.partial(), name_, content_, flushed_rows_);
-  FileDescriptor file = Open(partial);
+  LogFile file = WriteLogFile(partial.partial(), name_, content_, flushed_rows_);
   for (size_t k = 0; k < buffers_.size(); ++k) {
     const size_t size = buffers_[k].width * sizeof(double) * static_cast<size_t>(flushed_rows_);
-    CopyBytes(name_, file_.get(), offsets_[k], file.get(), offsets[k], size);
+    CopyBytes(name_, file_.get(), file_.offsets[k], file.get(), file.offsets[k], size);
   }
   if (::fsync(file.get()) != 0) Fail(errno);
   if (const int error = file.Close(); error != 0) Fail(error);

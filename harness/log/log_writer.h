@@ -78,7 +78,6 @@ class LogWriter {
 
   void RequireState(bool condition, const char* call) const;
   void RequireNoFile() const;
-  [[nodiscard]] FileDescriptor Open(const PartialFile& partial) const;
   void RequireFree(const std::string& name) const;
   void WriteBufferedRows();
   void CheckFileIsThere() const;
@@ -92,8 +91,7 @@ class LogWriter {
   State state_ = State::kDescribing;
   bool changed_ = false;  // texts or files that are not yet in the file
   LogContent content_;
-  std::vector<std::uint64_t> offsets_;  // of the signals in the file
-  FileDescriptor file_;
+  LogFile file_;
   std::vector<double> numbers_;  // all buffers
   std::vector<Buffer> buffers_;
   size_t buffered_rows_ = 0;
