@@ -137,7 +137,7 @@ static std::optional<double> FindStep(const RecordingSet& recordings, const Torq
   const std::vector<TorqueBalance::Block>& blocks = recordings[recording].fit->blocks();
   std::vector<int> payloads = ListLastLinks(model);
   if (model.base().type == BaseType::kFixed) payloads.push_back(-1);
-  // What holds nearly all the time is gravity, or a payload of the whole recording.
+  // A cause that holds nearly all the time is gravity, or a payload of the whole recording.
   const double begin = blocks[blocks.size() / 10].to, end = blocks.back().from;
   std::optional<double> step;
   double most = 0.0;

@@ -12,7 +12,7 @@
 namespace dexcheck::testing::motion_fit_test {
 namespace {
 
-/// What a drive delivers of a white torque error: all of it, or its mean over some rows.
+/// Adds the part of a white torque error that a drive delivers: all of it, or its mean over some rows.
 void AddTorqueErrors(size_t rows, std::mt19937* random, RecordedTable* table) {
   std::normal_distribution<double> normal;
   for (const std::string& name : table->names) {
