@@ -109,8 +109,11 @@ FilteredNoise::Shape FilteredNoise::MakeShape(const VectorXd& correlations) cons
 void FilteredNoise::ListShapes() {
   constexpr double kFinest = 1.4, kMostOfWindow = 0.125;
   shapes_ = {MakeShape(VectorXd::Unit(rows_, 0))};
+  const double longest = kMostOfWindow * static_cast<double>(rows_);
+  const int count = static_cast<int>(std::ceil(std::log(longest) / std::log(kFinest)));
   for (const Correlation& correlation : kCorrelations)
-    for (double length = 1.0; length < kMostOfWindow * static_cast<double>(rows_); length *= kFinest) {
+    for (int i = 0; i < count; ++i) {
+      const double length = std::pow(kFinest, i);
       VectorXd correlations(rows_);
       for (Index lag = 0; lag < rows_; ++lag)
         correlations[lag] = correlation(static_cast<double>(lag), length);

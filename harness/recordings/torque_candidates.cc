@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "controller/common/linear_algebra.h"
+#include "harness/recordings/nonlinear_faults.h"
 
 namespace dexcheck {
 namespace {
