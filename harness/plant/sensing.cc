@@ -55,12 +55,11 @@ ObjectSensor::ObjectSensor(const SensingOptions& options, double time_step, std:
       orientation_noise_(seed, "sensing.object_orientation_noise"),
       period_(options.object_rate > 0.0 ? CountSteps(1.0 / options.object_rate, time_step) : 1),
       delayed_(static_cast<size_t>(CountSteps(options.object_latency, time_step)) + 1),
-      low_pass_(CalcLowPassGain(options.object_velocity_cutoff, static_cast<double>(period_) * time_step)) {
-  const double position = options.object_position_noise;
-  const double orientation = options.object_orientation_noise;
-  position_gains_ = KalmanGains(options.object_acceleration, position * position, time_step);
-  orientation_gains_ = KalmanGains(options.object_acceleration, orientation * orientation, time_step);
-}
+      low_pass_(CalcLowPassGain(options.object_velocity_cutoff, static_cast<double>(period_) * time_step)),
+      position_gains_(options.object_acceleration,
+                      options.object_position_noise * options.object_position_noise, time_step),
+      orientation_gains_(options.object_acceleration,
+                         options.object_orientation_noise * options.object_orientation_noise, time_step) {}
 
 ObjectMotion ObjectSensor::Sample(const ObjectMotion& true_motion, std::uint64_t k) const {
   ObjectMotion seen = true_motion;
