@@ -20,7 +20,7 @@ class SearchLimit {
   [[nodiscard]] bool has_ended() const { return has_ended_; }
 
  private:
-  double end_;  // of the process's processor time, s
+  double end_;  // of the thread's processor time, s
   bool was_interrupted_;
   bool has_ended_ = false;
 };

@@ -62,13 +62,14 @@ Index FilteredNoise::CountLags() const {
 }
 
 void FilteredNoise::SetWindow(const VectorXd& times, const Eigen::RowVectorXd& smoothed) {
-  MatrixXd powers = MatrixXd::Ones(rows_, std::min(kMostOrder + 1, rows_ / 3));
+  const Index least = order_ + 1;
+  MatrixXd powers = MatrixXd::Ones(rows_, std::clamp(rows_ / 3, least, kMostOrder + 1));
   for (Index p = 1; p < powers.cols(); ++p)
     powers.col(p) = powers.col(p - 1).cwiseProduct(times / times.cwiseAbs().maxCoeff());
   smoothed_ = smoothed;
   difference_.setZero(rows_);
   for (const int k : {0, 1}) {
-    const MatrixXd half = powers(halves_[k], Eigen::seqN(0, std::min<Index>(order_ + 1, powers.cols())));
+    const MatrixXd half = powers(halves_[k], Eigen::seqN(0, least));
     difference_(halves_[k]) =
         (k == 0 ? 1.0 : -1.0) * half.completeOrthogonalDecomposition().pseudoInverse().row(0);
   }

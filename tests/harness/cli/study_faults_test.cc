@@ -58,11 +58,6 @@ TEST_F(StudyCommand, TrialsHaveATimeLimit) {
 }
 
 TEST_F(StudyCommand, AFullDiskLosesNothing) {
-#if defined(__has_feature)
-#if __has_feature(thread_sanitizer)
-  GTEST_SKIP() << "the thread sanitizer itself needs files larger than this test allows";
-#endif
-#endif
   Make("a.sqlite", {"--shard", "1/2"});
   const std::string before = Dump("a.sqlite");
   ProgramOptions full;
