@@ -24,4 +24,8 @@ std::vector<std::string> CompareContacts(const std::vector<ConstantNote>& first,
 std::vector<std::string> CompareOptions(const mjOption& first, const mjOption& second,
                                         const std::string& first_file, const std::string& second_file);
 
+/// Compares, by name, how soft limits, friction and equalities are, and sensors and keyframes: no term at a
+/// given state depends on them. @return a line on each kind that differs.
+std::vector<std::string> CompareRunElements(const mjModel& first, const mjModel& second);
+
 }  // namespace dexcheck

@@ -143,6 +143,7 @@ std::vector<EnginePart> ListFirstParts(const DescriptionFile& first, const std::
   MatchMotors(own.parts, &parts->parts);
   comparison->without_effect = CompareOptions(own_engine->opt, engine->opt, file, other);
   Append(CompareContacts(own.notes, parts->notes), &comparison->without_effect);
+  Append(CompareRunElements(*own_engine, *engine), &comparison->without_effect);
   Append(CompareMotorOrder(own.parts, parts->parts, file, other), &comparison->without_effect);
   Append(ListLoneMotors(own.parts, parts->parts, file, other), &comparison->not_compared);
   Append(LeaveOutShared(own.parts, parts->parts, *own_engine, engine), &comparison->not_compared);

@@ -202,6 +202,23 @@ TEST_F(TwoMjcfs, NoteTheOrderOfMotorsAndFramesOfOtherNames) {
   EXPECT_THAT(List(moved), HasSubstr("tool: position"));
 }
 
+TEST_F(TwoMjcfs, NoteSoftnessSensorsAndKeyframes) {
+  const auto write = [&](const char* softness, const char* sensor, const char* qpos) {
+    const std::string limit =
+        std::string("name=\"elbow\" limited='true' range='-1 1' solreflimit='") + softness;
+    const std::string rest = std::string("<sensor><jointpos name='encoder' joint='") + sensor +
+                             "'/></sensor><keyframe><key name='home' qpos='" + qpos +
+                             "'/></keyframe></mujoco>";
+    return ReplaceOnce(ReplaceOnce(kArm, "name=\"elbow\"", limit + "'"), kEnd, rest);
+  };
+  const std::string a = write("0.02 1", "elbow", "0 0");
+  EXPECT_THAT(Compare(a, a).without_effect, ::testing::IsEmpty());
+  const Comparison other = Compare(a, write("0.01 1", "shoulder", "0 0.1"));
+  EXPECT_TRUE(other.Agrees()) << List(other);
+  EXPECT_THAT(other.without_effect,
+              ::testing::ElementsAre("softness of limits: elbow", "sensors: encoder", "keyframes: home"));
+}
+
 // A slide moves along any line of its direction.
 TEST_F(TwoMjcfs, MayHaveASlideAtAnyPoint) {
   const std::string a = ReplaceOnce(kArm, "name=\"elbow\"", "name=\"elbow\" type=\"slide\"");
