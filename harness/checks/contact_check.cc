@@ -109,12 +109,13 @@ void EvaluateContact(const Contact& contact, const Pose& shift, size_t index, En
                            shift.inverse(Eigen::Isometry) * touch.position};
   engine.G = (R_cf.transpose() * terms.CalcObjectJacobian(touch.position)).transpose();
   // v + omega x arm at the contact
-  const Vector3d arm = place.p_projected - terms.FramePose(frame).translation();
+  const Matrix3d& tilt = terms.tilt().linear();
+  const Vector3d arm = tilt * (place.p_projected - terms.FramePose(frame).translation());
+  const Matrix3d R_T = (tilt * place.R_projected).transpose();
   const Matrix6Xd& columns = provider->columns(index);
   Eigen::Index k = 0;
   for (const int col : terms.chain(frame)) {
-    engine.J_B.col(col) =
-        place.R_projected.transpose() * (columns.col(k).head<3>() + columns.col(k).tail<3>().cross(arm));
+    engine.J_B.col(col) = R_T * (columns.col(k).head<3>() + columns.col(k).tail<3>().cross(arm));
     ++k;
   }
   EvaluateRates(terms, frame, context->robot, contact, place, &engine, model, scales);

@@ -152,7 +152,7 @@ void RunChecks::JudgeModel(const StepRecord& step) {
         std::ranges::all_of(state.overlap, [](double depth) { return depth > -PlantReading::kFar; }));
   }
   const GraspModel& plant = *declared_step_->model;
-  model_.Compare(plant.robot(), plant.grasp(), state, step.reading.X_W0, step.time);
+  model_.Compare(plant.robot(), plant.grasp(), state, step.reading.X_W0, step.time, step.reading.evaluated);
   if (!controller_) return;
   controller_->Compare(step.model->robot(), step.model->grasp(), step.measured.state, step.reading.X_W0,
                        step.time);

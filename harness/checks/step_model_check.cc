@@ -116,15 +116,17 @@ std::optional<ObjectCoordinates> StepModelCheck::FindCoordinates(const GraspTerm
   return ObjectCoordinates{grasp.X_o(), grasp.X_o_dot()};
 }
 
-void StepModelCheck::SetState(const GraspTerms& grasp, const MeasuredState& state) {
+void StepModelCheck::SetState(const GraspTerms& grasp, const MeasuredState& state,
+                              const EvaluatedPositions& evaluated) {
   const std::optional<ObjectCoordinates> coordinates = FindCoordinates(grasp);
-  engine_.SetState(state.q, state.xi, state.X_Bo, state.V_Bo, coordinates ? &*coordinates : nullptr);
+  engine_.SetState(state.q, state.xi, state.X_Bo, state.V_Bo, coordinates ? &*coordinates : nullptr,
+                   evaluated);
 }
 
 void StepModelCheck::Compare(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state,
-                             const Pose& X_W0, double when) {
+                             const Pose& X_W0, double when, const mjData* evaluated) {
   const bool has_object = comparison_.model().object().has_value();
-  SetState(grasp, state);
+  SetState(grasp, state, {evaluated, X_W0});
   controller_.Read(robot, grasp, state);
   comparison_.SetScales(robot, state.q, state.xi);
   ScaleContext& scales = comparison_.scales();

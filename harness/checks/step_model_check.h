@@ -54,16 +54,19 @@ class StepModelCheck {
   /// Leaves out the contacts' terms, where bonds replace contacts and the engine has nothing to compare.
   void LeaveOutContacts();
 
-  /// Evaluates the engine's terms alone, without those of contacts.
-  void SetState(const GraspTerms& grasp, const MeasuredState& state);
+  /// Evaluates the engine's terms alone, without those of contacts. @param evaluated as
+  /// EngineTerms::SetState.
+  void SetState(const GraspTerms& grasp, const MeasuredState& state,
+                const EvaluatedPositions& evaluated = {});
 
   /// Compares the terms. Nothing allocates except for the first failure.
   /// @param robot, grasp evaluated at `state`, reduced coordinates, CalcDynamics included.
   /// @param X_W0 pose of Sigma_0 in the plant, tilt and height included, where kappa was found. Without a
   /// plant, robot.CalcLinkPose(-1).
-  /// @param when time of the step, s.
+  /// @param when time of the step, s. @param evaluated the plant's positions at this state; null: they are
+  /// evaluated here.
   void Compare(const ModelTerms& robot, const GraspTerms& grasp, const MeasuredState& state, const Pose& X_W0,
-               double when);
+               double when, const mjData* evaluated = nullptr);
 
   /// The engine's terms at the last state.
   [[nodiscard]] const EngineProvider& engine() const { return engine_; }

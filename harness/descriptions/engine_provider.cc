@@ -77,9 +77,9 @@ void EngineProvider::SetState(const DynamicsState& state) {
 }
 
 void EngineProvider::SetState(const VectorXd& q, const VectorXd& xi, const Pose& X_Bo, const Vector6d& V_Bo,
-                              const ObjectCoordinates* coordinates) {
+                              const ObjectCoordinates* coordinates, const EvaluatedPositions& evaluated) {
   xi_ = xi;
-  terms_.SetState(q, xi, X_Bo, V_Bo);
+  terms_.SetState(q, xi, X_Bo, V_Bo, evaluated);
   for (size_t i = 0; i < frames_.size(); ++i) terms_.CalcFrameColumns(frames_[i], columns_[i]);
   energy_ = terms_.energy_and_momentum();
   if (has_object_) ReadObject(coordinates);
@@ -112,7 +112,7 @@ bool EngineProvider::HasMass(int link) const {
 
 void EngineProvider::ReadJacobians(Eigen::Ref<MatrixXd> out) const {
   for (size_t i = 0; i < frames_.size(); ++i) {
-    const Matrix3d R_T = terms_.FramePose(frames_[i]).linear().transpose();
+    const Matrix3d R_T = (terms_.tilt().linear() * terms_.FramePose(frames_[i]).linear()).transpose();
     Eigen::Index k = 0;
     for (const int col : terms_.chain(frames_[i])) {
       const Eigen::Index to = static_cast<Eigen::Index>(i) * terms_.size() + col;

@@ -46,8 +46,9 @@ class EngineProvider : public MechanismProvider {
   /// The object's state in the engine is built by its own quaternion algebra.
   void SetState(const DynamicsState& state) override;
   /// Sets the state of a run. @param coordinates of the object; null when it is not known by them.
+  /// @param evaluated as EngineTerms::SetState.
   void SetState(const VectorXd& q, const VectorXd& xi, const Pose& X_Bo, const Vector6d& V_Bo,
-                const ObjectCoordinates* coordinates);
+                const ObjectCoordinates* coordinates, const EvaluatedPositions& evaluated = {});
   [[nodiscard]] bool Has(Term term) const override;
   void Read(Term term, Eigen::Ref<MatrixXd> out) override;
   [[nodiscard]] bool HasMass(int link) const override;
@@ -56,7 +57,7 @@ class EngineProvider : public MechanismProvider {
   [[nodiscard]] const EngineTerms& terms() const { return terms_; }
   /// M_bar' at the last state.
   [[nodiscard]] const MatrixXd& M() const { return terms_.M(); }
-  /// The last of Read(kJ) of a compared frame: 6 x chain, world axes.
+  /// EngineTerms::CalcFrameColumns of a compared frame at the state set.
   [[nodiscard]] const Matrix6Xd& columns(size_t frame) const { return columns_[frame]; }
 
  private:

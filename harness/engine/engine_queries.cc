@@ -24,8 +24,9 @@ EngineMotion EngineMotion::MoveTo(const Vector3d& point) const {
 
 Pose EngineTerms::FramePose(int frame) const {
   const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
-  if (site < 0) return BodyPose(*data_, body_of(frame));
-  return MapPose(data_->site_xmat + 9 * site, data_->site_xpos + 3 * site);
+  return tilt_.inverse(Eigen::Isometry) *
+         (site < 0 ? BodyPose(*data_, body_of(frame))
+                   : MapPose(data_->site_xmat + 9 * site, data_->site_xpos + 3 * site));
 }
 
 const mjtNum* EngineTerms::PlaceOf(int frame) const {
@@ -108,8 +109,9 @@ EngineMotion EngineTerms::ReadMotion(mjtObj type, int id, const mjtNum* place) c
 
 EngineMotion EngineTerms::FrameMotion(int frame) const {
   const int site = adapter_->frame_sites()[static_cast<size_t>(frame)];
-  return site < 0 ? ReadMotion(mjOBJ_XBODY, body_of(frame), PlaceOf(frame))
-                  : ReadMotion(mjOBJ_SITE, site, PlaceOf(frame));
+  const EngineMotion motion = site < 0 ? ReadMotion(mjOBJ_XBODY, body_of(frame), PlaceOf(frame))
+                                       : ReadMotion(mjOBJ_SITE, site, PlaceOf(frame));
+  return {Move(motion.p), Turn(motion.v), Turn(motion.omega), Turn(motion.a), Turn(motion.alpha)};
 }
 
 Matrix3d EngineTerms::ObjectRotation() const { return RotationMap(data_->xmat + 9 * object_body_); }
@@ -157,7 +159,7 @@ EngineTouch EngineTerms::CalcTouch(int frame, const Pose& shift) {
   const int tip = chain_of(frame).tip_geom;
   place(tip);
   Eigen::Map<Vector3d> center(d->geom_xpos + 3 * tip);  // a sphere has no axes
-  center = shift * Vector3d(center);
+  center = shift * Move(center);
   EngineTouch touch;
   for (const int geom : object_geoms_) {
     place(geom);

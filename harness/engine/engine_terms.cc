@@ -54,6 +54,7 @@ EngineTerms::EngineTerms(const Adapter& adapter, Coordinates coordinates, std::s
     vector->setZero(n);
   FindObject();
   ListChains(frames);
+  ListMass();
   // Gravity is formed from the masses' places, so that the bias force is Coriolis alone.
   mju_zero(engine_->opt.gravity, 3);
 }
@@ -120,30 +121,55 @@ void EngineTerms::ListChains(std::span<const int> frames) {
 }
 
 void EngineTerms::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
-                           const Pose& X_Bo, const Vector6d& V_Bo) {
+                           const Pose& X_Bo, const Vector6d& V_Bo, const EvaluatedPositions& evaluated) {
   q_ = q;
-  SetPositions(q, X_Bo);
+  SetPositions(q, X_Bo, evaluated);
   SetVelocities(q, velocity, V_Bo);
-  CalcMass();
+  CalcMass(evaluated.data == nullptr ? *data_ : *evaluated.data);
   CalcForces();
   CalcBodyAccelerations();
   CalcEnergyAndMomentum();
 }
 
-void EngineTerms::SetPositions(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo) {
+void EngineTerms::SetPositions(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo,
+                               const EvaluatedPositions& evaluated) {
   const mjModel* m = engine_.get();
   mjData* d = data_.get();
   adapter_->SetPositions(q, d->qpos);
   if (has_object_) WriteFreePose(X_Bo, d->qpos + adapter_->object_qpos());
+  tilt_.setIdentity();
+  // Forces of tendons and fluids need more than places of bodies.
+  if (evaluated.data != nullptr && m->ngeom == 0 && m->ntendon == 0) {
+    tilt_ = evaluated.X_W0 * BasePose().inverse(Eigen::Isometry);
+    return TakePositions(*evaluated.data);
+  }
   mj_kinematics(m, d);
   mj_comPos(m, d);
   MakeMass(*m, d);
 }
 
+void EngineTerms::TakePositions(const mjData& from) {
+  const mjModel& m = *engine_;
+  mjData* d = data_.get();
+  const auto take = [](const mjtNum* values, mjtNum* own, EngineSize count) {
+    std::copy_n(values, count, own);
+  };
+  take(from.xpos, d->xpos, 3 * m.nbody);
+  take(from.xquat, d->xquat, 4 * m.nbody);
+  take(from.xmat, d->xmat, 9 * m.nbody);
+  take(from.xipos, d->xipos, 3 * m.nbody);
+  take(from.ximat, d->ximat, 9 * m.nbody);
+  take(from.site_xpos, d->site_xpos, 3 * m.nsite);
+  take(from.site_xmat, d->site_xmat, 9 * m.nsite);
+  take(from.subtree_com, d->subtree_com, 3 * m.nbody);
+  take(from.cinert, d->cinert, 10 * m.nbody);
+  take(from.cdof, d->cdof, 6 * m.nv);
+}
+
 void EngineTerms::SetVelocities(const Eigen::Ref<const VectorXd>& q,
                                 const Eigen::Ref<const VectorXd>& velocity, const Vector6d& V_Bo) {
   mjData* d = data_.get();
-  map_.SetState(q, velocity);
+  map_.SetState(q, velocity, tilt_.linear());
   map_.Expand(velocity, d->qvel);
   map_.ExpandBias(d->qacc);
   if (has_object_) {
@@ -159,8 +185,28 @@ void EngineTerms::SetVelocities(const Eigen::Ref<const VectorXd>& q,
   mj_comVel(engine_.get(), d);
 }
 
-void EngineTerms::CalcMass() {
-  ExpandMass(*engine_, *data_, mass_nv_.data());
+void EngineTerms::ListMass() {
+  std::vector<int> own(static_cast<size_t>(engine_->nv), -1);
+  for (size_t i = 0; i < adapter_->joint_dofs().size(); ++i)
+    own[static_cast<size_t>(adapter_->joint_dofs()[i])] = base_size_ + static_cast<int>(i);
+  for (int row = 0; row < engine_->nv; ++row) {
+    int steps = 0;
+    for (int col = row; col >= 0; col = engine_->dof_parentid[col], ++steps) {
+      const int address = FindMassEntry(*engine_, row, steps);
+      const int own_row = own[static_cast<size_t>(row)], own_col = own[static_cast<size_t>(col)];
+      if (address >= 0) mass_entries_.push_back({row, col, address, own_row, own_col});
+    }
+  }
+}
+
+void EngineTerms::CalcMass(const mjData& evaluated) {
+  const mjtNum* const entries = GetMassEntries(evaluated);
+  for (const MassEntry& one : mass_entries_) {
+    const double value = entries[one.address];
+    mass_nv_(one.row, one.col) = mass_nv_(one.col, one.row) = value;
+    if (one.own_row >= 0 && one.own_col >= 0)
+      M_(one.own_row, one.own_col) = M_(one.own_col, one.own_row) = value;
+  }
   const MatrixXd& T = map_.base_columns();
   const int* const base = map_.base_dofs().data();
   const int* const joints = adapter_->joint_dofs().data();
@@ -183,8 +229,6 @@ void EngineTerms::CalcMass() {
       for (int k = 0; k < carrying_dofs_; ++k) sum += mass_nv_(dof, base[k]) * T(k, col);
       M_(row, col) = M_(col, row) = sum;
     }
-    for (Eigen::Index col = base_size_; col < M_.rows(); ++col)
-      M_(row, col) = mass_nv_(dof, joints[col - base_size_]);
   }
 }
 
@@ -196,13 +240,15 @@ void EngineTerms::CalcForces() {
   if (has_object_) object_coriolis_ = ObjectForce();
 
   // A dof moves its subtree's centre of mass by v + omega x p, both about the whole tree's centre of mass.
-  const Vector3d g = MapVector(adapter_->engine().opt.gravity);
+  const Vector3d g = MapVector(adapter_->engine().opt.gravity), tilted = tilt_.linear() * g;
+  const int object = has_object_ ? adapter_->object_dof() : m->nv;
   for (int i = 0; i < m->nv; ++i) {
+    const bool is_object = i >= object && i < object + 6;
     const int body = m->dof_bodyid[i];
     const Vector3d arm =
         MapVector(d->subtree_com + 3 * body) - MapVector(d->subtree_com + 3 * m->body_rootid[body]);
     const Vector3d moved = MapVector(d->cdof + 6 * i + 3) + MapVector(d->cdof + 6 * i).cross(arm);
-    force_nv_[i] = -m->body_subtreemass[body] * g.dot(moved);
+    force_nv_[i] = -m->body_subtreemass[body] * (is_object ? g : tilted).dot(moved);
   }
   map_.ProjectForce(force_nv_.data(), gravity_);
   if (has_object_) object_gravity_ = ObjectForce();
@@ -291,9 +337,12 @@ void EngineTerms::CalcEnergyAndMomentum() {
   };
   for (const int dof : map_.base_dofs()) add_rotor(dof);
   for (const int dof : adapter_->joint_dofs()) add_rotor(dof);
-  if (total_mass > 0.0) energy_.com = mass_moment / total_mass;
-  energy_.potential = -MapVector(adapter_->engine().opt.gravity).dot(mass_moment);
-  energy_.angular_momentum = about_origin - energy_.com.cross(energy_.linear_momentum);
+  Vector3d com = Vector3d::Zero();
+  if (total_mass > 0.0) com = mass_moment / total_mass;
+  energy_.angular_momentum = Turn(about_origin - com.cross(energy_.linear_momentum));
+  energy_.linear_momentum = Turn(energy_.linear_momentum);
+  energy_.com = Move(com);
+  energy_.potential = -MapVector(adapter_->engine().opt.gravity).dot(total_mass * energy_.com);
 }
 
 }  // namespace dexcheck

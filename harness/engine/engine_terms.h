@@ -32,6 +32,12 @@ struct EngineTouch {
   Vector3d normal = Vector3d::Zero();    ///< From the fingertip into the object, world.
 };
 
+/// Positions that the engine has evaluated already.
+struct EvaluatedPositions {
+  const mjData* data = nullptr;  ///< Of the same model, at the same q' and X_Bo but for the base's pose.
+  Pose X_W0 = Pose::Identity();  ///< That pose, of Sigma_0.
+};
+
 /// The engine's own values of the analytic model's terms, in the same coordinates. Works in a private copy of
 /// the engine's model and data, at states without tilt and with rolling wheels, so that a disagreement is a
 /// disagreement of models. Only a Jacobian's columns that can differ from zero by the engine's tree are
@@ -50,8 +56,11 @@ class EngineTerms {
   void RequireObject() const;
 
   /// Evaluates robot and object at q', velocity (xi or q_dot'), the object's pose and body velocity.
+  /// @param evaluated the positions, if `data` is not null: they are not evaluated once more then. The terms
+  /// are those of the upright base all the same.
   void SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
-                const Pose& X_Bo = Pose::Identity(), const Vector6d& V_Bo = Vector6d::Zero());
+                const Pose& X_Bo = Pose::Identity(), const Vector6d& V_Bo = Vector6d::Zero(),
+                const EvaluatedPositions& evaluated = {});
 
   /// Number n of velocity coordinates.
   [[nodiscard]] int size() const { return map_.size(); }
@@ -79,13 +88,15 @@ class EngineTerms {
   [[nodiscard]] Vector3d JointAxis(int joint, int column = 2) const;
   [[nodiscard]] Vector3d JointAnchor(int joint) const;
 
+  /// The way from the upright base to the base of the positions that were evaluated already.
+  [[nodiscard]] const Pose& tilt() const { return tilt_; }
   /// Pose of Sigma_0.
   [[nodiscard]] Pose BasePose() const { return adapter_->GetBasePose(data_->qpos); }
   [[nodiscard]] Pose FramePose(int frame) const;
 
   /// Velocity coordinates that move a frame, ascending, by the engine's own tree.
   [[nodiscard]] const std::vector<int>& chain(int frame) const { return chain_of(frame).coordinates; }
-  /// Jacobian of a frame's origin, [linear; angular] in world axes: 6 x chain columns.
+  /// Jacobian of a frame's origin, [linear; angular] in world axes as tilt() turns them: 6 x chain columns.
   void CalcFrameColumns(int frame, Eigen::Ref<Matrix6Xd> J) const;
   /// The whole Jacobian of a frame's origin, 6 x n.
   [[nodiscard]] Matrix6Xd CalcFrameJacobian(int frame) const;
@@ -128,10 +139,16 @@ class EngineTerms {
   /// Keeps the engine from placing geoms in every state, unless a force depends on them.
   void DropGeoms();
   void ListChains(std::span<const int> frames);
-  void SetPositions(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo);
+  void SetPositions(const Eigen::Ref<const VectorXd>& q, const Pose& X_Bo,
+                    const EvaluatedPositions& evaluated);
+  void TakePositions(const mjData& from);
+  /// Moves what the engine has at its base's pose to the upright base.
+  [[nodiscard]] Vector3d Turn(const Vector3d& vector) const { return tilt_.linear().transpose() * vector; }
+  [[nodiscard]] Vector3d Move(const Vector3d& point) const { return Turn(point - tilt_.translation()); }
   void SetVelocities(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
                      const Vector6d& V_Bo);
-  void CalcMass();
+  void ListMass();
+  void CalcMass(const mjData& evaluated);
   void CalcForces();
   void CalcBiasForce();
   void CalcCoriolis(const Eigen::Ref<const VectorXd>& velocity, Eigen::Ref<VectorXd> result);
@@ -150,8 +167,16 @@ class EngineTerms {
   int carrying_dofs_;  // the base's without the wheels
   VectorXd q_;
 
+  Pose tilt_ = Pose::Identity();
+
+  /// An entry of the engine's M that can differ from zero, row >= col.
+  struct MassEntry {
+    int row, col, address;
+    int own_row, own_col;  // of M(); -1 for a dof of the base or of no part
+  };
+  std::vector<MassEntry> mass_entries_;
   MatrixXd M_;
-  MatrixXd mass_nv_;  // scratch of all the engine's dofs
+  MatrixXd mass_nv_;  // of all the engine's dofs
   VectorXd force_nv_, bracket_nv_;
   VectorXd coriolis_, gravity_, friction_;
   VectorXd other_velocity_, other_force_;  // scratch of CalcCoriolisProduct

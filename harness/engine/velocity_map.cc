@@ -57,7 +57,8 @@ void VelocityMap::FillRates(const Vector3d& anchor_velocity, double yaw, double 
   }
 }
 
-void VelocityMap::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity) {
+void VelocityMap::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
+                           const Matrix3d& tilt) {
   if (base_size_ == 0 || is_floating_) return;
   const double phi = q[2];
   const Vector3d heading(std::cos(phi), std::sin(phi), 0.0);
@@ -78,6 +79,10 @@ void VelocityMap::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref
       turns ? Vector3d(motion.yaw * heading.dot(motion.linear) * left) : Vector3d::Zero();
   const double forward_rate = heading.dot(acceleration) + motion.yaw * left.dot(motion.linear);
   FillRates(acceleration - motion.yaw * motion.yaw * arm, 0.0, forward_rate, bias_);
+  if (adapter_->base_joints().size() > 1) return;
+  // A free joint has its linear velocity along the world's axes.
+  for (int i = 0; i < base_size_; ++i) T_base_.col(i).head<3>() = tilt * T_base_.col(i).head<3>().eval();
+  bias_.head<3>() = tilt * bias_.head<3>().eval();
 }
 
 void VelocityMap::Expand(const Eigen::Ref<const VectorXd>& velocity, mjtNum* qvel) const {

@@ -18,7 +18,9 @@ class VelocityMap {
   VelocityMap(const Adapter& adapter, Coordinates coordinates);
 
   /// Evaluates T and T_dot velocity at q' and xi (reduced) or q_dot' (unreduced).
-  void SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity);
+  /// @param tilt turns the upright base to where the engine has it.
+  void SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
+                const Matrix3d& tilt = Matrix3d::Identity());
 
   /// Number of velocity coordinates.
   [[nodiscard]] int size() const { return base_size_ + static_cast<int>(adapter_->joint_dofs().size()); }

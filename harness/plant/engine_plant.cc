@@ -22,6 +22,7 @@ void EnginePlant::Read(PlantReading* reading) {
   reading->body_positions = Eigen::Map<const VectorXd>(simulation_.data().xpos, 3 * bodies);
   reading->body_rotations = Eigen::Map<const VectorXd>(simulation_.data().xmat, 9 * bodies);
   reading->touch.support_force = support_force_;
+  reading->evaluated = simulation_.is_changed() ? nullptr : &simulation_.data();
 }
 
 void EnginePlant::EndStep(const Eigen::Ref<const VectorXd>& tau) {

@@ -127,6 +127,7 @@ void EngineSimulation::CheckHealth(double expected_time) const {
 }
 
 void EngineSimulation::Change(const std::function<void(mjModel*)>& change) {
+  is_changed_ = true;
   change(model_.get());
   DeriveConstants(model_.get());
 }

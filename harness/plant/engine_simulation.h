@@ -53,6 +53,8 @@ class EngineSimulation {
 
   /// Changes this simulation's own model, and the quantities that the engine derives from it.
   void Change(const std::function<void(mjModel*)>& change);
+  /// Whether Change was called.
+  [[nodiscard]] bool is_changed() const { return is_changed_; }
 
   [[nodiscard]] EngineState GetState() const;
   void SetState(const EngineState& state);
@@ -63,7 +65,7 @@ class EngineSimulation {
   const Adapter* adapter_;
   MjModelPtr model_;  // the adapter's, but for the damping
   MjDataPtr data_;
-  bool is_pushed_ = false;
+  bool is_pushed_ = false, is_changed_ = false;
   VectorXd damping_;         // nv, N m s/rad; not integrated implicitly
   std::vector<int> motors_;  // by entry of tau'; -1 for those of a floating base
   std::vector<int> dofs_;    // by entry of tau', as motors_

@@ -2,6 +2,8 @@
 
 // The simulated plant: robot and object, driven by torques.
 
+#include <mujoco/mujoco.h>
+
 #include <array>
 #include <cstdint>
 #include <span>
@@ -36,6 +38,9 @@ struct PlantReading {
   VectorXd qvel;                 ///< MuJoCo's velocities (nv).
   /// Origin (3) and rotation, row by row (9), of each of MuJoCo's bodies; empty for a plant without them.
   VectorXd body_positions, body_rotations;
+  /// MuJoCo's data with the positions of this state, until the next step begins; null for a plant without it
+  /// or with another model than the scenario's.
+  const mjData* evaluated = nullptr;
 
   /// Gap between fingertip and object from which on they count as far apart, m.
   static constexpr double kFar = 5e-3;
