@@ -169,14 +169,14 @@ std::string FormatSi(double value, const std::string& unit) {
     double factor;
     const char* name;
   };
-  static constexpr std::array<Prefix, 7> kPrefixes = {
-      {{1.0, ""}, {1e-3, "m"}, {1e-6, "\u00b5"}, {1e-9, "n"}, {1e-12, "p"}, {1e-15, "f"}, {1e-18, "a"}}};
+  static constexpr std::array<Prefix, 4> kPrefixes = {
+      {{1.0, ""}, {1e-3, "m"}, {1e-6, "\u00b5"}, {1e-9, "n"}}};
   const double size = std::abs(value);
-  if (size < 1e-18) return "0 " + unit;
+  if (size == 0.0) return "0 " + unit;
   // Compared with what rounds to 1.00 of the prefix.
   const auto* prefix =
       std::ranges::find_if(kPrefixes, [&](const Prefix& p) { return size >= 0.9995 * p.factor; });
-  if (prefix == kPrefixes.end()) prefix = &kPrefixes.back();
+  if (prefix == kPrefixes.end()) return "< 1 n" + unit;
   const double scaled = value / prefix->factor;
   const int decimals = std::abs(scaled) < 9.995 ? 2 : std::abs(scaled) < 99.95 ? 1 : 0;
   return fmt::format("{:.{}f} {}{}", scaled, decimals, prefix->name, unit);

@@ -98,7 +98,8 @@ struct OverlayState {
 /// Title, time and errors of one row of a run, and where its checks stand then.
 OverlayState MakeOverlayState(const RunFrames& run, long row, const std::vector<CategoryStatus>& categories);
 
-/// A length, angle or other number with a prefix that keeps one to three digits before the point: "12.4 nm".
+/// A length, angle or other number with a prefix that keeps one to three digits before the point: "12.4 nm";
+/// "< 1 nm" below that.
 std::string FormatSi(double value, const std::string& unit);
 
 class Overlay {

@@ -177,6 +177,11 @@ class GeomAdder {
     MakeConnector(mjGEOM_ARROW, arrow.radius, arrow.from.data(), end.data(), &geom);
   }
 
+  void operator()(const Rod& rod) {
+    MakeConnector(mjGEOM_CAPSULE, rod.radius, rod.from.data(), rod.to.data(),
+                  &Add(mjGEOM_CAPSULE, rod.color));
+  }
+
   void operator()(const Cone& cone) {
     mjvGeom& geom = Add(mjGEOM_MESH, cone.color);
     geom.dataid = cone_;

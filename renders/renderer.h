@@ -69,6 +69,14 @@ struct Arrow {
   Color color;
 };
 
+/// A piece of a line.
+struct Rod {
+  Vector3d from;
+  Vector3d to;
+  double radius;  ///< m.
+  Color color;
+};
+
 /// The forces that Coulomb friction allows: a cone that opens from its apex along its axis.
 struct Cone {
   Vector3d apex;
@@ -78,7 +86,7 @@ struct Cone {
   Color color;
 };
 
-using Decoration = std::variant<Arrow, Cone>;
+using Decoration = std::variant<Arrow, Rod, Cone>;
 
 struct RenderOptions {
   int width = 1280;

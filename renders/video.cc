@@ -122,7 +122,7 @@ constexpr double kCourseMargin = 0.03;  // fraction of the picture
 // A frame at k / fps belongs to the row recorded at that time even if the two quotients round differently.
 constexpr double kTimeRounding = 1e-9;
 
-/// The decades that hold a run's errors, at most six.
+/// The decades that hold a run's errors, at most six, and none below 1 nm.
 std::array<double, 2> ErrorRange(const std::vector<double>& errors) {
   double low = 1e300;
   double high = 0.0;
@@ -131,11 +131,10 @@ std::array<double, 2> ErrorRange(const std::vector<double>& errors) {
     low = std::min(low, error);
     high = std::max(high, error);
   }
-  if (high == 0.0) return {1e-12, 1e-9};
-  high = std::pow(10.0, std::ceil(std::log10(high)));
+  constexpr double kLeast = 1e-9, kMostDecades = 1e6;
+  high = std::max(std::pow(10.0, std::ceil(std::log10(high))), 1e3 * kLeast);
   low = std::pow(10.0, std::floor(std::log10(low)));
-  constexpr double kMostDecades = 1e6;
-  return {std::max(low, high / kMostDecades), high};
+  return {std::clamp(low, std::max(kLeast, high / kMostDecades), 0.1 * high), high};
 }
 
 const Color kForce = MakeColor(0xe0102e);
@@ -163,6 +162,31 @@ std::vector<Decoration> MakeForces(const RunFrames& run, long row, double meters
   return decorations;
 }
 
+/// The object's desired way on the floor, with a bar across it after each metre; none of a shorter way.
+std::vector<Decoration> MakeWay(const RunFrames& run) {
+  constexpr double kPiece = 0.05, kHalfBar = 0.15, kRadius = 0.008;  // m
+  constexpr size_t kMost = 2000;
+  const Color color = MakeColor(0xf4a340);
+  std::vector<Decoration> way;
+  double length = 0.0;
+  Vector3d from = Vector3d::Zero();
+  for (long row = 0; row < run.desired_positions.rows() && way.size() < kMost; ++row) {
+    const Vector3d to(run.desired_positions(row, 0), run.desired_positions(row, 1), 0.0);
+    if (row == 0) from = to;
+    const double piece = (to - from).norm();
+    if (!(piece > kPiece)) continue;
+    way.emplace_back(Rod{from, to, kRadius, color});
+    if (std::floor(length + piece) > std::floor(length)) {
+      const Vector3d across = kHalfBar * Vector3d::UnitZ().cross(to - from) / piece;
+      way.emplace_back(Rod{to - across, to + across, kRadius, color});
+    }
+    length += piece;
+    from = to;
+  }
+  if (length < 1.0) way.clear();
+  return way;
+}
+
 /// The key to their colours.
 std::vector<LegendEntry> MakeForceLegend(const RunFrames& run) {
   std::vector<LegendEntry> legend;
@@ -184,7 +208,8 @@ class Painter {
         renderer_(model_, MakeRenderOptions()),
         meters_per_newton_(CalcMetersPerNewton(run_)),
         checks_(run_),
-        error_range_(ErrorRange(run_.position_errors)) {
+        error_range_(ErrorRange(run_.position_errors)),
+        way_(MakeWay(run_)) {
     if (options.panel) overlay_.emplace();
     for (const std::string& camera : {camera_, options.inset}) {
       if (IsOwn(camera, kObjectCamera)) FindObject();
@@ -200,8 +225,10 @@ class Painter {
   Image Paint(double time) {
     const long row = run_.RowAt(run_.times.front() + time + kTimeRounding);
     SetRow(model_, run_, row, data_.get());
-    std::vector<Decoration> decorations;
-    if (options_.forces) decorations = MakeForces(run_, row, meters_per_newton_);
+    std::vector<Decoration> decorations = way_;
+    if (options_.forces) {
+      for (const Decoration& force : MakeForces(run_, row, meters_per_newton_)) decorations.push_back(force);
+    }
     const std::optional<Viewpoint> view = FindOwnView(camera_, MakeEdges());
     Image image = view ? renderer_.Render(*data_, *view, options_.width, options_.height, decorations)
                        : renderer_.Render(*data_, decorations);
@@ -322,6 +349,7 @@ class Painter {
   double meters_per_newton_;
   CheckHistory checks_;
   std::array<double, 2> error_range_;
+  std::vector<Decoration> way_;
   std::optional<Overlay> overlay_;
 };
 
