@@ -15,8 +15,8 @@ const MakeCharts = () => {
     charts.set(canvas, new Chart(canvas, config));
     return charts.get(canvas);
   };
-  const Short = x => {
-    const rounded = Number(x.toPrecision(3));
+  const Short = (x, digits = 3) => {
+    const rounded = Number(x.toPrecision(digits));
     return rounded !== 0 && (Math.abs(rounded) < 1e-3 || Math.abs(rounded) >= 1e6) ? rounded.toExponential() : String(rounded);
   };
   const IsWide = (least, most) => least > 0 && most / least > 30;
@@ -26,28 +26,32 @@ const MakeCharts = () => {
     return `rgb(${mix(255, 65, 8)},${mix(255, 182, 29)},${mix(204, 196, 88)})`;
   };
 
-  // Ends of an axis for these numbers; none where all are one.
+  // A label in lines of at most about 14 letters.
+  const Wrap = text => text.length > 14 ? text.match(/.{1,14}(?:[_ .,-]|$)|.+/g) : text;
+  // Ends of an axis for these numbers; none where they differ by rounding only.
   const EndsOf = (numbers, log) => {
     const finite = numbers.filter(x => Number.isFinite(x) && (!log || x > 0));
     const least = finite.reduce((a, b) => Math.min(a, b), Infinity), most = finite.reduce((a, b) => Math.max(a, b), -Infinity);
-    if (!(most > least)) return [];
+    if (!(most - least > 1e-9 * Math.max(Math.abs(least), Math.abs(most)))) return [];
     const room = 0.04 * (log ? Math.log(most / least) : most - least);
     return log ? [least * Math.exp(-room), most * Math.exp(room)] : [least >= 0 ? Math.max(least - room, 0) : least - room, most + room];
   };
 
-  // An axis: {label, labels (texts of 0, 1, ..), log}.
+  // An axis: {label, labels (texts of 0, 1, ..), log, ticks (the only ones)}.
   const MakeAxis = (axis, least, most) => {
-    const scale = {title: {display: true, text: axis.label}, ticks: {maxRotation: 50}};
+    const scale = {title: {display: true, text: axis.label}, type: axis.log ? 'logarithmic' : 'linear', min: least, max: most,
+      ticks: {maxRotation: 50, includeBounds: false}};
+    const SetTicks = values => scale => { scale.ticks = values.map(value => ({value})); };
     if (axis.labels) {
-      return {...scale, type: 'linear', min: -0.5, max: axis.labels.length - 0.5, afterBuildTicks: scale => {
-        scale.ticks = axis.labels.map((_, i) => ({value: i}));
-      }, ticks: {...scale.ticks, autoSkip: false, callback: i => axis.labels[i].match(/.{1,14}(?:[_ .,-]|$)|.+/g)}};
+      return {...scale, type: 'linear', min: -0.5, max: axis.labels.length - 0.5, afterBuildTicks: SetTicks(axis.labels.map((_, i) => i)),
+        ticks: {...scale.ticks, autoSkip: false, callback: i => Wrap(axis.labels[i])}};
     }
-    if (axis.log) {
-      return {...scale, type: 'logarithmic', min: least, max: most,
-        ticks: {...scale.ticks, callback: (x, i, ticks) => Number.isInteger(Math.log10(x)) || ticks.length < 8 ? Short(x) : null}};
-    }
-    return {...scale, type: 'linear', min: least, max: most, ticks: {...scale.ticks, callback: Short}};
+    if (axis.ticks) return {...scale, afterBuildTicks: SetTicks(axis.ticks), ticks: {...scale.ticks, callback: x => Short(x)}};
+    // Neighbours differ in their last digit.
+    const Tick = (x, i, ticks) => ticks.length < 2 ? Short(x) : Short(x, Math.max(3, 1 + Math.ceil(
+      Math.log10(Math.max(...ticks.map(tick => Math.abs(tick.value))) / Math.abs(ticks[1].value - ticks[0].value)))));
+    const LogTick = (x, i, ticks) => Number.isInteger(Math.log10(x)) || ticks.length < 8 ? Short(x) : null;
+    return {...scale, ticks: {...scale.ticks, callback: axis.log ? LogTick : Tick}};
   };
   const Legend = shown => ({display: shown, position: 'bottom', labels: {boxWidth: 14}});
   const Choose = choose => (_, elements, chart) => {
@@ -60,13 +64,14 @@ const MakeCharts = () => {
   // Bars along labels: sets of {label, values, color, thin}; a value may be [from, to].
   const Bars = (canvas, {labels, sets, unit = '', log = false, least, most}) => {
     const thin = sets.some(set => set.thin);
-    canvas.parentElement.style.height = 110 + labels.length * (thin ? 24 : 14 * sets.length + 4) + 'px';
+    const lines = labels.map(Wrap), most_lines = Math.max(...lines.map(line => [line].flat().length));
+    canvas.parentElement.style.height = 110 + labels.length * (Math.max(thin ? 20 : 14 * sets.length, 15 * most_lines) + 4) + 'px';
     return Draw(canvas, {
       type: 'bar',
-      data: {labels, datasets: sets.map(set => ({label: set.label, data: set.values, backgroundColor: set.color, grouped: !thin,
+      data: {labels: lines, datasets: sets.map(set => ({label: set.label, data: set.values, backgroundColor: set.color, grouped: !thin,
         barThickness: set.thin ? 3 : thin ? 14 : undefined, order: set.thin ? 0 : 1}))},
       options: {indexAxis: 'y', plugins: {legend: Legend(sets.length > 1), tooltip: {callbacks: {label: item =>
-        item.dataset.label + ' ' + [item.raw].flat().map(Short).join(' to ') + (unit ? ' ' + unit : '')}}},
+        item.dataset.label + ' ' + [item.raw].flat().map(x => Short(x)).join(' to ') + (unit ? ' ' + unit : '')}}},
         scales: {x: MakeAxis({label: unit, log}, least, most), y: {ticks: {autoSkip: false}}}}
     });
   };

@@ -85,8 +85,20 @@
     }
     return [least, most];
   };
-  const AxisOf = (column, list = rows) => ({label: columns[column].label, labels: column === kOutcome ? study.outcomes.map(o => o.name)
-    : columns[column].labels, log: !columns[column].labels && column !== kOutcome && IsWide(...Range(list, column))});
+  // Whether numbers of a key, sorted, are rather multiples of each other than evenly spaced.
+  const IsGeometric = ([...at]) => {
+    const least = at[0], most = at[at.length - 1], middle = Median(at);
+    return least > 0 && most >= 3 * least &&
+      Math.abs(Math.log(middle / least) / Math.log(most / least) - 0.5) < Math.abs((middle - least) / (most - least) - 0.5);
+  };
+  const ValuesOf = (list, column) => [...new Set(list.map(row => value(row, column)))].sort((a, b) => a - b);
+  const AxisOf = (column, list = rows) => {
+    const {label, labels} = columns[column];
+    if (labels || column === kOutcome) return {label, labels: labels ?? study.outcomes.map(o => o.name)};
+    if (column >= firstMetric || column < kFirstKey) return {label, log: IsWide(...Range(list, column))};
+    const values = ValuesOf(list, column);
+    return {label, log: IsGeometric(values), ticks: values.length < 8 ? values : undefined};
+  };
   // Colours of numbers, pale to dark; those that differ by rounding have one.
   const ColorsOf = (least, most, none) => {
     const f = IsWide(least, most) ? Math.log : x => x, isFlat = !(most > least) || Short(least) === Short(most);
@@ -148,7 +160,7 @@
 
   // Edges of cells along a key: between its values where these are few, else even ones.
   const EdgesOf = column => {
-    const values = [...new Set(rows.map(row => value(row, column)))].sort((a, b) => a - b), {log, labels} = AxisOf(column);
+    const values = ValuesOf(rows, column), {log, labels} = AxisOf(column);
     const f = log ? Math.log : x => x, back = log ? Math.exp : x => x;
     if (values.length <= 200 && values.length * 4 <= rows.length * (study.is_grid ? 100 : 1)) {
       const at = values.map(f), gap = (i, j) => at[j] - at[i], last = at.length - 1;
@@ -171,16 +183,20 @@
     };
     const cells = [...groups].map(([key, group]) => {
       const i = key % ex.length, j = Math.floor(key / ex.length), row = group.includes(chosen) ? chosen : worst(group);
-      return {x: [ex[i], ex[i + 1]], y: [ey[j], ey[j + 1]], row, z: z === kOutcome ? value(worst(group), kOutcome) : mean(group)};
+      return {x: [ex[i], ex[i + 1]], y: [ey[j], ey[j + 1]], row, outcome: study.outcomes[value(worst(group), kOutcome)],
+        z: z === kOutcome ? value(worst(group), kOutcome) : mean(group)};
     });
     const finite = cells.map(cell => cell.z).filter(Number.isFinite);
     const least = finite.reduce((a, b) => Math.min(a, b), Infinity), most = finite.reduce((a, b) => Math.max(a, b), -Infinity);
-    const colors = ColorsOf(least, most, '#e8e8e8');
-    for (const cell of cells) cell.color = z === kOutcome ? study.outcomes[cell.z].color : colors.of(cell.z);
+    const colors = ColorsOf(least, most);
+    for (const cell of cells) cell.color = z === kOutcome ? cell.outcome.color : colors.of(cell.z) ?? cell.outcome.color;
+    const unit = columns[z].label.split(', ')[1], AndUnit = x => Short(x) + (unit ? ' ' + unit : '');
+    const others = finite.length < cells.length ? '; the other cells show their outcome' : '';
     Cells(canvas, {x: AxisOf(x), y: AxisOf(y), cells, chosen, choose: Choose, describe: p => Describe(p.row) + (z === kOutcome ? '' : `; ${columns[z].name} ${Show(p.z, z)}`)});
     text.textContent = z === kOutcome ? `The worst outcome of each cell${isPart ? ', of the trials on this page' : ''}.`
-      : finite.length && colors.isFlat ? `${Short(least)} everywhere; grey: no value.`
-      : finite.length ? `From ${Short(least)} (pale) to ${Short(most)} (dark)${colors.isLog ? ', by the logarithm' : ''}; grey: no value.` : 'No value.';
+      : finite.length && colors.isFlat ? `${AndUnit(least)} everywhere.`
+      : finite.length ? `From ${AndUnit(least)} (pale) to ${AndUnit(most)} (dark)${colors.isLog ? ', by the logarithm' : ''}${others}.` : 'No value.';
+    return finite.length > 0 && !colors.isFlat;
   };
 
   const DrawHistory = () => {
@@ -221,7 +237,10 @@
 
   // The table: as many as one can read, sorted by any column.
   let sorted = {column: kNumber, down: false};
-  const tableColumns = [...columns.keys()].filter(i => i !== kSeed || study.seeds > 1);
+  // Not those in which each trial has 0 or no value.
+  const isUsed = [...columns.keys()].map(i => i === kSeed ? study.seeds > 1 : i < firstMetric || columns[i].name === study.error ||
+    study.shown.includes(columns[i].name) || [...Array(count).keys()].some(row => value(row, i)));
+  const tableColumns = [...columns.keys()].filter(i => isUsed[i]);
   const OnPress = (element, act) => Object.assign(element, {tabIndex: 0, onclick: act, onkeydown: event => {
     if (event.key === 'Enter' || event.key === ' ') { event.preventDefault(); act(); }
   }});
@@ -232,7 +251,7 @@
       return sorted.down ? y - x : x - y;
     }).slice(0, 50);
     byId('head').replaceChildren(...tableColumns.map(column => {
-      const th = OnPress(Make('th', columns[column].name), () => {
+      const th = OnPress(Make('th', columns[column].label), () => {
         sorted = {column, down: sorted.column === column && !sorted.down};
         DrawTable();
         byId('head').children[tableColumns.indexOf(column)].focus();
@@ -278,7 +297,8 @@
   const Draw = () => {
     Filter();
     ShowChosen();
-    for (const {z, canvas, text} of maps) DrawMap(canvas, kFirstKey, kFirstKey + 1, z, text);
+    for (const {z, canvas, text} of maps)
+      canvas.parentElement.hidden = DrawMap(canvas, kFirstKey, kFirstKey + 1, z, text) === false && z !== kOutcome;
     const [x, y, color, cx, cy, cz] = ['x', 'y', 'color', 'cx', 'cy', 'cz'].map(id => Number(byId(id)?.value));
     if (study.keys.length > 1) DrawMap(byId('map'), cx, cy, cz, byId('range'));
     DrawPair(byId('scatter'), x, y, color);
@@ -289,7 +309,7 @@
     DrawTable();
   };
   const Fill = (id, from, to, start, first = []) => {
-    for (const i of [...first, ...Array(to - from).keys()].map((i, k) => k < first.length ? i : from + i)) byId(id).append(new Option(columns[i].label, i));
+    for (const i of [...first, ...[...columns.keys()].slice(from, to).filter(i => isUsed[i])]) byId(id).append(new Option(columns[i].label, i));
     Object.assign(byId(id), {value: start, onchange: Draw});
   };
   const GoToHash = () => {
@@ -324,7 +344,10 @@
   if (study.keys.length > 1) {
     Fill('cx', kFirstKey, firstMetric, kFirstKey);
     Fill('cy', kFirstKey, firstMetric, kFirstKey + 1);
-    Fill('cz', firstMetric, width, study.is_grid ? shown[0] : kOutcome, [kOutcome]);
+    // Another quantity than the maps above.
+    const other = [...columns.keys()].find(i => i >= firstMetric && isUsed[i] && !shown.includes(i)) ?? shown[0];
+    Fill('cz', firstMetric, width, study.is_grid ? other : kOutcome, [kOutcome]);
+    if (!study.is_grid) get('charts').prepend(get('over-two'));
   }
   byId('outcome').append(new Option('any outcome', ''));
   study.outcomes.forEach((outcome, i) => byId('outcome').append(new Option(outcome.name, i)));

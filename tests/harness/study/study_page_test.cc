@@ -158,7 +158,7 @@ TEST_F(StudyPageBrowserTest, LooksCloserAtItsTrials) {
   choose("outcome", "");
   // Sorted by energy, the largest first: trial 0 has 1, trial 11 a twelfth.
   const std::string energy =
-      "[...document.querySelectorAll('#explore-head th')].find(t => t.textContent === 'energy')";
+      "[...document.querySelectorAll('#explore-head th')].find(t => t.textContent === 'energy, J')";
   Run(energy + ".click();");
   EXPECT_EQ(Run("return document.querySelector('#explore-body td').textContent;"), "11");
   Run(energy + ".dispatchEvent(new KeyboardEvent('keydown', {key: 'Enter'}));");
