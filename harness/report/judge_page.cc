@@ -157,12 +157,12 @@ std::vector<Figure> MakeFigures(const RobotModel& model, const RecordingJudgemen
                     {.label = "model and causes", .values = collect(&TorqueTrace::explained), .color = 2}}});
     figures.push_back(
         {.name = "left-" + joint.name,
-         .title = "left over",
-         .label = "rest" + unit,
+         .title = "left",
+         .label = "torque left" + unit,
          .band = kBand * balance.noise,
          .below = true,
          .curves = {
-             {.label = "beyond model and causes", .values = collect(&TorqueTrace::left), .color = 3}}});
+             {.label = "left by model and causes", .values = collect(&TorqueTrace::left), .color = 3}}});
   }
   return figures;
 }

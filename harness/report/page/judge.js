@@ -20,8 +20,8 @@
   Add(document.querySelector('header'), Add(Make('div', '', {className: 'tiles'}), ...[
     [data.rows.toLocaleString('en'), several ? `rows of ${data.recordings.length} recordings` : 'rows'],
     [String(new Set(data.joints.map(({joint}) => joint)).size), 'joints judged'],
-    ...(causes.length ? [[Percent(data.explained), 'of what the model leaves is explained by the causes']] : []),
-    [Short(Ratio(worst)) + ' ×', `the noise is left at most: ${worst.joint}`],
+    ...(causes.length ? [[Percent(data.explained), 'of the unexplained torque is explained by the causes']] : []),
+    [Short(Ratio(worst)) + ' ×', `the noise is left, most at ${worst.joint}`],
   ].map(([value, label]) => Card('', Make('b', value), Make('span', label)))));
 
   // What one cause adds to the others.
@@ -29,7 +29,7 @@
   const Meter = cause => Add(Make('div', Percent(Part(cause)), {className: 'number'}),
     Add(Make('span', '', {className: 'meter accent'}), Make('i', '', {style: `width: ${100 * Part(cause)}%`})));
   if (causes.length) {
-    AddSection('Causes', Make('p', 'The one that explains most first, each with its standard error. This motion does not separate the faults of one row.', {className: 'soft'}),
+    AddSection('Causes', Make('p', 'The cause that explains most comes first; ± is one standard error.' + (causes.some(cause => cause.faults.length > 1) ? ' This motion does not separate the faults of one row.' : ''), {className: 'soft'}),
       Card('scroll', CauseTable(causes.map(cause => {
         const begin = data.begins[Math.max(cause.recording, 0)];
         const place = several && cause.recording >= 0 ? `in ${data.recordings[cause.recording]}` : '';
@@ -58,20 +58,20 @@
     }
     const Mark = (kind, mark, words) => Add(Make('span', '', {className: 'cell ' + kind}), Make('i', mark), ' ' + words);
     AddSection('Alternatives', Add(Make('p', '', {className: 'soft legend'}), 'Columns are the causes above. ', Mark('named', '●', 'the only one that explains it'), Mark('same', '◆', 'one of a class'),
-      Mark('same', '◇', 'explains it as well'), Mark('rival', '1e3', 'so many times less likely')), Card('scroll', matrix));
+      Mark('same', '◇', 'explains it as well'), Mark('rival', '1e3', '1000 times less likely')), Card('scroll', matrix));
   }
 
   // Each joint's torques on one logarithmic line.
-  const kinds = [['torque', 'measured'], ['residual', 'beyond the model'], ['left', 'beyond the causes'], ['noise', 'noise']];
+  const kinds = [['torque', 'measured'], ['residual', 'unexplained'], ['left', 'left'], ['noise', 'noise']];
   const sizes = data.joints.flatMap(joint => kinds.map(([key]) => joint[key])).filter(x => x > 0);
   const low = Math.log10(Math.min(...sizes)), span = Math.max(Math.log10(Math.max(...sizes)) - low, 1e-9);
   const Strip = joint => Add(Make('div', '', {className: 'strip', role: 'img', ariaLabel: kinds.map(([key, words]) => `${words} ${Short(joint[key])}`).join(', ')}),
     ...kinds.filter(([key]) => joint[key] > 0).map(([key, words]) => Make('i', '', {className: key, title: `${words} ${Short(joint[key])}`,
       style: `left: ${Math.round(1000 * (Math.log10(joint[key]) - low) / span) / 10}%`})));
   const has_gains = data.joints.some(joint => joint.drive_gain !== undefined);
-  const Joints = joints => Card('scroll joints', Table(['joint', 'measured', 'beyond the model', 'beyond the causes', 'noise', 'held out', ...(has_gains ? ['N m/A'] : []), 'sizes'],
+  const Joints = joints => Card('scroll joints', Table(['joint', 'measured', 'unexplained', 'left', 'noise', 'held out', ...(has_gains ? ['N m/A'] : []), 'sizes'],
     joints.map(joint => [joint.joint, ...['torque', 'residual', 'left', 'noise', 'held_left', ...(has_gains ? ['drive_gain'] : [])].map(key => Short(key === 'held_left' ? joint[key] || null : joint[key])), Strip(joint)])));
-  AddSection('Joints', Add(Make('p', 'Root mean squares of torques, N m or N. Held out: beyond the causes, in the quarter of the recording with which no cause was found. ', {className: 'soft legend'}),
+  AddSection('Joints', Add(Make('p', 'Root mean squares of torques, N m or N: unexplained by the model, left after the causes, and left on the quarter that was held out from their search. ', {className: 'soft legend'}),
     ...kinds.map(([key, words]) => Add(Make('span', '', {className: 'strip-key'}), Make('i', '', {className: key}), words)), 'on a logarithmic line.'),
     ...data.recordings.flatMap((name, i) => [...(several ? [Make('h3', name, {className: 'group'})] : []), Joints(data.joints.filter(joint => joint.recording === i))]));
   const replay = document.getElementById('replay-html');

@@ -44,7 +44,7 @@
     }));
   }
   const {tracking = {}, simulated_s = run.end, torque_limited = [], clearance = {}, speed = {}} = summary;
-  const Error = (value, unit, label) => [Number.isFinite(value) ? `${ShowNumber(value)} ${unit}` : '–', label];
+  const Error = (value, unit, label) => [!Number.isFinite(value) ? '–' : value > 0 && value < 1e-9 ? `< 1 n${unit}` : `${ShowNumber(value)} ${unit}`, label];
   const cone = checks.find(check => check.name === 'cone_use' && IsReached(check));
   Tiles([
     ...(Number.isFinite(tracking.joint_error_max_rad) ? [Error(tracking.joint_error_max_rad, 'rad', 'largest error of a joint')]
