@@ -135,7 +135,7 @@ void CandidateSearch::SearchBody(int link) {
     Add({fault, 3.0, kBodyMask, std::move(values)}, link, ListBodySites(link), {std::move(patch)});
   };
   if (node.parts.empty() || (pair_.given(link).body.mass == 0.0 && right.body.mass > 0.0)) {
-    offer(MakeWhole(Kind::kMissing), fmt::format("mass {:.6g} in the other file", right.body.mass),
+    offer(MakeWhole(Kind::kMissing), fmt::format("mass {:.6g} kg in the other file", right.body.mass),
           GiveBody(right.body));
     if (node.parts.empty()) return;
   }
@@ -159,9 +159,9 @@ void CandidateSearch::SearchBody(int link) {
     if (is_in_proportion) {
       values = fmt::format("all of it {:.6g} times the other file's", factor);
     } else if (std::abs(factor - 1.0) > kSame) {
-      values = "mass " + DescribeRight(given.mass, right.body.mass);
+      values = "mass " + DescribeRight(given.mass, right.body.mass, " kg");
     } else if ((given.com - right.body.com).norm() > kSame) {
-      values = "centre of mass " + DescribeRight(given.com, right.body.com);
+      values = "centre of mass " + DescribeRight(given.com, right.body.com, " m");
     }
     offer(MakeWhole(Kind::kShapes), std::move(values), GiveBody(right.body));
   } else if (is_made) {
@@ -193,7 +193,7 @@ void CandidateSearch::SearchPart(const Part& part) {
   const MassProperties right = part.right;
   if (part.IsWrong(SiteKind::kMass)) {
     EditTrial number = part.Make({Kind::kNumber, SiteKind::kMass}, CountBits(right.mass, part.open.mass),
-                                 DescribeRight(part.given.mass.value, right.mass));
+                                 DescribeRight(part.given.mass.value, right.mass, " kg"));
     const auto take = [m = PrintedScalar{right.mass, part.open.mass}](PrintedLink* made) {
       made->inertial->mass = m;
     };
@@ -210,7 +210,7 @@ void CandidateSearch::SearchPart(const Part& part) {
     }
   }
   if (part.IsWrong(SiteKind::kCom)) {
-    const auto [bits, values] = CompareEntries(kAxisNames, given, right.com, part.open.com);
+    const auto [bits, values] = CompareEntries(kAxisNames, given, right.com, part.open.com, " m");
     const auto take = [c = right.com, open = part.open.com](PrintedLink* made) {
       made->inertial->origin.t = c;
       made->inertial->origin.half_t = open;
@@ -221,10 +221,10 @@ void CandidateSearch::SearchPart(const Part& part) {
   if (part.IsWrong(SiteKind::kInertia)) SearchInertiaNumbers(part);
   if (!part.is_fused || part.link != part.node) return;
   constexpr double kTenNumbers = 90.0;
-  EditTrial number =
-      part.Make(MakeWhole(Kind::kNumber), kTenNumbers - part.extra,
-                fmt::format("mass {}; centre of mass {}", DescribeRight(part.given.mass.value, right.mass),
-                            DescribeRight(given, right.com)));
+  EditTrial number = part.Make(
+      MakeWhole(Kind::kNumber), kTenNumbers - part.extra,
+      fmt::format("mass {}; centre of mass {}", DescribeRight(part.given.mass.value, right.mass, " kg"),
+                  DescribeRight(given, right.com, " m")));
   Try(number, part.link, GiveBody(right));
 }
 
@@ -237,7 +237,7 @@ void CandidateSearch::SearchInertiaNumbers(const Part& part) {
   const Vector6d open =
       ToEntries(R.isIdentity(1e-9) ? part.open.inertia
                                    : Matrix3d(R.transpose().cwiseAbs() * part.open.inertia * R.cwiseAbs()));
-  const auto [bits_of_six, values] = CompareEntries(kInertiaNames, given6, right6, open);
+  const auto [bits_of_six, values] = CompareEntries(kInertiaNames, given6, right6, open, " kg m^2");
   const auto offer = [&](Kind kind, double bits, const std::string& shown, int component = 0,
                          bool in_second = false) {
     EditTrial trial = part.Make({kind, SiteKind::kInertia, component}, bits, shown);
@@ -275,7 +275,7 @@ void CandidateSearch::SearchInertiaNumbers(const Part& part) {
       Try(part.Make({Kind::kFrame, SiteKind::kInertia, k},
                     1.0 + CountBits(std::abs(angle) > kHalf ? angle : 0.0, kHalf),
                     fmt::format("{} of the inertial frame {}", kAngleNames[k],
-                                DescribeRight(part.given.origin.r[k], angle))),
+                                DescribeRight(part.given.origin.r[k], angle, " rad"))),
           part.link, [k, angle](PrintedLink* made) { made->inertial->origin.r[k] = angle; });
     }
   }

@@ -230,22 +230,22 @@ std::string DescribeRight(const std::string& given, const std::string& right) {
   return fmt::format("{} here, {} in the other file", given, right);
 }
 
-std::string DescribeRight(double given, double right) {
-  return DescribeRight(fmt::format("{:.6g}", given), fmt::format("{:.6g}", right));
+std::string DescribeRight(double given, double right, const char* unit) {
+  return DescribeRight(fmt::format("{:.6g}{}", given, unit), fmt::format("{:.6g}{}", right, unit));
 }
 
-std::string DescribeRight(const Vector3d& given, const Vector3d& right) {
-  return DescribeRight("(" + ShowVector(given) + ")", "(" + ShowVector(right) + ")");
+std::string DescribeRight(const Vector3d& given, const Vector3d& right, const char* unit) {
+  return DescribeRight("(" + ShowVector(given) + ")" + unit, "(" + ShowVector(right) + ")" + unit);
 }
 
 EntryDifference CompareEntries(std::span<const char* const> names, const double* given, const double* right,
-                               const double* open) {
+                               const double* open, const char* unit) {
   EntryDifference difference;
   for (const size_t k : ListDiffering(names.size(), given, right, open)) {
     const double shown = ShowZero(right[k], open[k]);
     difference.bits += CountBits(shown, open[k]);
     difference.values += fmt::format("{}{} {}", difference.values.empty() ? "" : "; ", names[k],
-                                     DescribeRight(given[k], shown));
+                                     DescribeRight(given[k], shown, unit));
   }
   return difference;
 }

@@ -113,22 +113,22 @@ class CandidateSearch {
 /// nothing.
 std::optional<double> CountLeft(double after, double before);
 
-/// "0.1 here, 0.2 in the other file"
+/// "0.1 kg here, 0.2 kg in the other file". @param unit as " kg".
 std::string DescribeRight(const std::string& given, const std::string& right);
-std::string DescribeRight(double given, double right);
-std::string DescribeRight(const Vector3d& given, const Vector3d& right);
-/// The bits of the entries that differ by more than the tolerance, and "x 0.1 here, 0.2 in the other file" of
-/// each.
+std::string DescribeRight(double given, double right, const char* unit);
+std::string DescribeRight(const Vector3d& given, const Vector3d& right, const char* unit);
+/// The bits of the entries that differ by more than the tolerance, and "x 0.1 m here, 0.2 m in the other
+/// file" of each.
 struct EntryDifference {
   double bits = 1.0;
   std::string values{};
 };
 EntryDifference CompareEntries(std::span<const char* const> names, const double* given, const double* right,
-                               const double* open);
+                               const double* open, const char* unit);
 template <typename Vector>
 EntryDifference CompareEntries(std::span<const char* const> names, const Vector& given, const Vector& right,
-                               const Vector& open) {
-  return CompareEntries(names, given.data(), right.data(), open.data());
+                               const Vector& open, const char* unit) {
+  return CompareEntries(names, given.data(), right.data(), open.data(), unit);
 }
 /// "0.1 0 -0.2": entries that are rounding beside the largest are 0.
 std::string ShowVector(const Vector3d& v);

@@ -62,38 +62,42 @@ constexpr const char* kSixWords[] = {
 constexpr const char* kSixIds[] = {"by_rows", "by_columns", "products_yz_xz_xy", "products_xy_yz_xz",
                                    "products_xz_xy_yz"};
 
-/// A quantity: its names in an id and in words, and units that it may be taken in.
+/// A quantity: its names in an id and in words, units that it may be taken in, its unit of a joint that turns
+/// and of one that slides.
 struct SiteWords {
   SiteKind kind;
   const char* id;
   const char* words;
   std::span<const UnitFault> units = {};
+  const char* turning = "";
+  const char* sliding = "";
 };
-constexpr SiteWords kSites[] = {{SiteKind::kCarrier, "carrier", "carrying link"},
-                                {SiteKind::kPresence, "joint", "joint"},
-                                {SiteKind::kName, "joint", "name"},
-                                {SiteKind::kLinkName, "link", "name"},
-                                {SiteKind::kType, "type", "type"},
-                                {SiteKind::kPosition, "origin", "position", kLengths},
-                                {SiteKind::kRotation, "rotation", "rotation"},
-                                {SiteKind::kAxis, "axis", "axis"},
-                                {SiteKind::kAxisPoint, "axis_point", "point of the axis"},
-                                {SiteKind::kRange, "range", "range", kRanges},
-                                {SiteKind::kMimic, "coupling", "mimic"},
-                                {SiteKind::kDamping, "damping", "damping", kForces},
-                                {SiteKind::kFriction, "friction", "friction", kForces},
-                                {SiteKind::kArmature, "armature", "armature", kArmatures},
-                                {SiteKind::kEffort, "effort", "effort limit", kForces},
-                                {SiteKind::kVelocity, "velocity", "velocity limit", kForces},
-                                {SiteKind::kStiffness, "stiffness", "stiffness", kForces},
-                                {SiteKind::kSpringAngle, "spring_reference", "spring's angle"},
-                                {SiteKind::kGear, "gear", "motor's gear", kSignOnly},
-                                {SiteKind::kMass, "mass", "mass", kMasses},
-                                {SiteKind::kCom, "com", "centre of mass", kLengths},
-                                {SiteKind::kInertia, "inertia", "inertia", kInertias},
-                                {SiteKind::kGravity, "gravity", "gravity", kGravities},
-                                {SiteKind::kConstraint, "constraint", "constraint"},
-                                {SiteKind::kMotor, "motor", "motor"}};
+constexpr SiteWords kSites[] = {
+    {SiteKind::kCarrier, "carrier", "carrying link"},
+    {SiteKind::kPresence, "joint", "joint"},
+    {SiteKind::kName, "joint", "name"},
+    {SiteKind::kLinkName, "link", "name"},
+    {SiteKind::kType, "type", "type"},
+    {SiteKind::kPosition, "origin", "position", kLengths},
+    {SiteKind::kRotation, "rotation", "rotation"},
+    {SiteKind::kAxis, "axis", "axis"},
+    {SiteKind::kAxisPoint, "axis_point", "point of the axis"},
+    {SiteKind::kRange, "range", "range", kRanges, " rad", " m"},
+    {SiteKind::kMimic, "coupling", "mimic"},
+    {SiteKind::kDamping, "damping", "damping", kForces, " N m s/rad", " N s/m"},
+    {SiteKind::kFriction, "friction", "friction", kForces, " N m", " N"},
+    {SiteKind::kArmature, "armature", "armature", kArmatures, " kg m^2", " kg"},
+    {SiteKind::kEffort, "effort", "effort limit", kForces, " N m", " N"},
+    {SiteKind::kVelocity, "velocity", "velocity limit", kForces, " rad/s", " m/s"},
+    {SiteKind::kStiffness, "stiffness", "stiffness", kForces, " N m/rad", " N/m"},
+    {SiteKind::kSpringAngle, "spring_reference", "spring's angle", {}, " rad", " m"},
+    {SiteKind::kGear, "gear", "motor's gear", kSignOnly},
+    {SiteKind::kMass, "mass", "mass", kMasses},
+    {SiteKind::kCom, "com", "centre of mass", kLengths},
+    {SiteKind::kInertia, "inertia", "inertia", kInertias},
+    {SiteKind::kGravity, "gravity", "gravity", kGravities},
+    {SiteKind::kConstraint, "constraint", "constraint"},
+    {SiteKind::kMotor, "motor", "motor"}};
 
 const SiteWords& FindSite(SiteKind kind) { return *std::ranges::find(kSites, kind, &SiteWords::kind); }
 
@@ -239,6 +243,10 @@ std::string NamePlace(const PrintedLink& link, SiteKind kind) {
 }
 
 const char* NameSite(SiteKind kind) { return FindSite(kind).words; }
+
+const char* FindUnit(SiteKind kind, bool slides) {
+  return slides ? FindSite(kind).sliding : FindSite(kind).turning;
+}
 
 std::string DescribeFault(const FileFault& fault) {
   std::string what = NameSite(fault.of);

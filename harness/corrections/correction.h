@@ -167,7 +167,7 @@ struct CorrectionCandidate {
   std::vector<Site> sites;
   double bits = 0.0;  ///< Beyond those of which convention and where.
   std::vector<LinkPatch> patches;
-  std::string values;                   ///< "mass 1.9 here, 1.998 in the other file"
+  std::string values;                   ///< "mass 1.9 kg here, 1.998 kg in the other file"
   std::optional<FaultBeside> beside{};  ///< The sites are right only if this is undone too.
   double rest =
       1.0;  ///< How far sites are from right then, relative to the digits' tolerances; 1: they are right.
@@ -184,6 +184,8 @@ std::string DescribeFault(const FileFault& fault);
 /// A stable name: "inertia.about_origin", "com.mm", "number.mass", "exchange.body".
 std::string NameFault(const FileFault& fault);
 const char* NameSite(SiteKind kind);
+/// Returns the unit of a joint's quantity as " N m"; empty where it has none.
+const char* FindUnit(SiteKind kind, bool slides);
 /// Names the place of a quantity of a link: "link l1", "joint q1", or "frame tip".
 std::string NamePlace(const PrintedLink& link, SiteKind kind);
 

@@ -25,9 +25,9 @@ struct CorrectionItem {
   bool in_second = false;           ///< The second file has the fault.
   std::vector<std::string> places;  ///< "joint q1", "link l1"; "robot" of what is of all.
   std::vector<std::string>
-      values;               ///< By place: "mass 1.9 here, 1.998 in the other file"; empty of a convention.
-  std::vector<Site> sites;  ///< Sites that it puts right.
-  double explained = 0.0;   ///< Their share of all sites that differ, 0 to 1.
+      values;  ///< By place: "mass 1.9 kg here, 1.998 kg in the other file"; empty of a convention.
+  std::vector<Site> sites;         ///< Sites that it puts right.
+  double explained = 0.0;          ///< Their share of all sites that differ, 0 to 1.
   std::vector<LinkPatch> patches;  ///< Links with it undone.
   double bits = 0.0;
   std::vector<CorrectionItem> rivals;  ///< Within a factor of ten of its probability.

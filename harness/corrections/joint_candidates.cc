@@ -28,7 +28,7 @@ void CandidateSearch::SearchAxis(int link) {
   const double open = joint.half_axis.sum() / std::max(joint.axis.norm(), 1e-9) + right.axis_tolerance;
   const auto offer = [&](const FileFault& fault, double bits, const Vector3d& axis, double more = 0.0) {
     if ((axis - right.axis).norm() > open + more) return;
-    AddSimple({fault, bits, 0, DescribeRight(joint.axis, axis)}, link,
+    AddSimple({fault, bits, 0, DescribeRight(joint.axis, axis, "")}, link,
               [axis](PrintedLink* made) { made->joint.axis = axis; });
   };
   if (!joint.states_axis) return offer({Kind::kMissing, SiteKind::kAxis}, 0.5, right.axis);
@@ -50,14 +50,15 @@ void CandidateSearch::SearchAxis(int link) {
 void CandidateSearch::SearchRange(int link) {
   const PrintedJoint& joint = pair_.a().link(link).joint;
   const PrintedJoint& other = pair_.b().link(pair_.Partner(link)).joint;
+  const char* const unit = FindUnit(SiteKind::kRange, joint.kind == JointKind::kSlide);
   const auto add = [&](Kind kind, double bits, const std::string& values, int component = 0) {
     AddSimple(MakeTrial(kind, SiteKind::kRange, bits, values, component), link,
               [range = other.range](PrintedLink* made) { made->joint.range = range; });
   };
   if (!joint.range)
-    return add(
-        Kind::kMissing, 3.0,
-        fmt::format("{:.6g} to {:.6g} in the other file", (*other.range)[0].value, (*other.range)[1].value));
+    return add(Kind::kMissing, 3.0,
+               fmt::format("{:.6g} to {:.6g}{} in the other file", (*other.range)[0].value,
+                           (*other.range)[1].value, unit));
   if (!other.range) return add(Kind::kSurplus, 3.0, "");
   const PrintedScalar lower = (*joint.range)[0], upper = (*joint.range)[1];
   const PrintedScalar right_lower = (*other.range)[0], right_upper = (*other.range)[1];
@@ -84,7 +85,7 @@ void CandidateSearch::SearchRange(int link) {
   const double given[] = {lower.value, upper.value};
   const double right[] = {right_lower.value, right_upper.value};
   const double open[] = {lower.half + right_lower.half + 1e-9, upper.half + right_upper.half + 1e-9};
-  const auto [bits, values] = CompareEntries(kNames, given, right, open);
+  const auto [bits, values] = CompareEntries(kNames, given, right, open, unit);
   add(Kind::kNumber, bits, values);
 }
 
@@ -104,7 +105,7 @@ void CandidateSearch::SearchMimic(int link) {
   double bits = 1.0;
   const auto say = [&](const char* name, const PrintedScalar& x, const PrintedScalar& y) {
     if (!Differ(x, y)) return;
-    values += fmt::format("{}{} {}", values.empty() ? "" : "; ", name, DescribeRight(x.value, y.value));
+    values += fmt::format("{}{} {}", values.empty() ? "" : "; ", name, DescribeRight(x.value, y.value, ""));
     bits += CountBits(y.value, y.half);
   };
   say("multiplier", joint.mimic->multiplier, other.mimic->multiplier);
@@ -120,6 +121,7 @@ void CandidateSearch::SearchScalar(int link, JointScalar scalar) {
   const PrintedRobot& a = pair_.a();
   const PrintedRobot& b = pair_.b();
   const auto at = static_cast<size_t>(scalar);
+  const char* const unit = FindUnit(ToSite(scalar), a.link(link).joint.kind == JointKind::kSlide);
   const bool has_motors = a.has_motors && b.has_motors;
   const std::optional<PrintedScalar> given = TakeScalar(a.link(link), scalar, has_motors);
   const std::optional<PrintedScalar> right = TakeScalar(b.link(pair_.Partner(link)), scalar, has_motors);
@@ -140,9 +142,10 @@ void CandidateSearch::SearchScalar(int link, JointScalar scalar) {
   constexpr double kColumn = 0.1;
   if (given->value == 0.0)
     add(Kind::kMissing, PrintedPair::States(a, scalar) ? 3.0 : kColumn,
-        fmt::format("{:.6g} in the other file", right->value));
+        fmt::format("{:.6g}{} in the other file", right->value, unit));
   if (right->value == 0.0)
-    add(Kind::kSurplus, PrintedPair::States(b, scalar) ? 5.0 : kColumn, fmt::format("{:.6g}", given->value));
+    add(Kind::kSurplus, PrintedPair::States(b, scalar) ? 5.0 : kColumn,
+        fmt::format("{:.6g}{}", given->value, unit));
   if (given->value == -right->value) add(Kind::kSign, 0.0);
   const std::span<const UnitFault> units = ListUnits(ToSite(scalar));
   for (size_t k = 0; k < units.size() && given->value != 0.0 && right->value != 0.0; ++k) {
@@ -152,7 +155,7 @@ void CandidateSearch::SearchScalar(int link, JointScalar scalar) {
   }
   // A number that the file does not state is missing, and no other value.
   if (a.link(link).joint.scalars[at])
-    add(Kind::kNumber, CountBits(right->value, right->half), DescribeRight(given->value, right->value));
+    add(Kind::kNumber, CountBits(right->value, right->half), DescribeRight(given->value, right->value, unit));
 }
 
 void CandidateSearch::SearchJoint(int link) {
@@ -181,7 +184,7 @@ void CandidateSearch::SearchJoint(int link) {
   // Only an MJCF states a point of the axis; in other files it is the link's origin.
   if (IsWrong(link, SiteKind::kAxisPoint) && pair_.a().format == RobotFormat::kMjcf) {
     AddSimple(MakeTrial(Kind::kNumber, SiteKind::kAxisPoint, given.joint.anchor.isZero() ? 40.0 : 20.0,
-                        DescribeRight(given.joint.anchor, right.anchor)),
+                        DescribeRight(given.joint.anchor, right.anchor, " m")),
               link, [&](PrintedLink* made) { made->joint.anchor = right.anchor; });
   }
   if (IsWrong(link, SiteKind::kRange)) SearchRange(link);
@@ -266,7 +269,7 @@ void CandidateSearch::SearchRobot() {
       const Vector3d& right = *b.gravity;
       const Vector3d open = Vector3d::Constant(1e-6);
       const double size = right.norm();
-      const auto [bits, values] = CompareEntries(kAxisNames, given, right, open);
+      const auto [bits, values] = CompareEntries(kAxisNames, given, right, open, " m/s^2");
       if ((given + right).norm() <= 1e-6 * size) add(Kind::kSign, 0.0, values);
       if (given.isZero()) add(Kind::kMissing, 0.0, values);
       if ((1e-3 * given - right).norm() <= 1e-6 * size) add(Kind::kUnit, 0.0, values);

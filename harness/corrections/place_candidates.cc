@@ -20,7 +20,9 @@ double CountAngle(double angle, double half) {
   return is_quarter ? kQuarter : CountBits(angle, half);
 }
 
-std::string ShowAngles(const Matrix3d& R) { return "roll pitch yaw " + ShowVector(SolveRollPitchYaw(R)[0]); }
+std::string ShowAngles(const Matrix3d& R) {
+  return "roll pitch yaw " + ShowVector(SolveRollPitchYaw(R)[0]) + " rad";
+}
 
 LinkUndo TakeRotation(const Matrix3d& R) {
   return [R](PrintedLink* link) { link->origin.SetRotation(R); };
@@ -115,7 +117,7 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
     offer(CorrectionKind::kSurplus, TurnsQuarters(given) ? 5.0 : 8.0, "");
   if (!is_row && given.isIdentity(1e-12)) {
     const Vector3d none = Vector3d::Zero(), open = Vector3d::Constant(half);
-    const double bits = CompareEntries(kAngleNames, none, SolveRollPitchYaw(right)[0], open).bits;
+    const double bits = CompareEntries(kAngleNames, none, SolveRollPitchYaw(right)[0], open, "").bits;
     offer(CorrectionKind::kMissing, TurnsQuarters(right) ? 3.5 : 4.0 + 0.35 * bits,
           ShowAngles(right) + " in the other file");
   }
@@ -148,12 +150,13 @@ void CandidateSearch::SearchRotationNumbers(const Origin& origin) {
       is_one_angle = true;
       const double value = std::abs(solved[k]) <= half ? 0.0 : solved[k];
       offer(CorrectionKind::kNumber, 1.0 + std::min(CountBits(value, half), CountBits(angle, half)),
-            fmt::format("{} {}", kAngleNames[k], DescribeRight(r[k], value)));
+            fmt::format("{} {}", kAngleNames[k], DescribeRight(r[k], value, " rad")));
     }
     for (const Vector3d& angles : SolveRollPitchYaw(right)) {
       if (is_one_angle) break;
       const Vector3d near = (angles - r).unaryExpr([](double d) { return std::remainder(d, 2.0 * kPi); }) + r;
-      const auto [bits, values] = CompareEntries(kAngleNames, r, near, Vector3d(Vector3d::Constant(half)));
+      const auto [bits, values] =
+          CompareEntries(kAngleNames, r, near, Vector3d(Vector3d::Constant(half)), " rad");
       offer(CorrectionKind::kNumber, 1.0 + bits, values);
     }
   }
@@ -175,7 +178,7 @@ void CandidateSearch::SearchPositionNumbers(const Origin& origin) {
   const Vector3d& t = origin.given.t;
   const Vector3d right = origin.right.translation();
   const Vector3d open = origin.open_length;
-  const auto [bits, values] = CompareEntries(kAxisNames, t, right, open);
+  const auto [bits, values] = CompareEntries(kAxisNames, t, right, open, " m");
   const auto take = [right](PrintedLink* link) { link->origin.t = right; };
   const PrintedJoint& joint = pair_.a().link(origin.node).joint;
   const auto [ref, refs] = CompareReferences(origin);
@@ -193,7 +196,7 @@ void CandidateSearch::SearchPositionNumbers(const Origin& origin) {
 void CandidateSearch::SearchPoseNumbers(const Origin& origin) {
   const Vector3d t = origin.right.translation();
   const Matrix3d R = origin.right.linear();
-  const std::string values = fmt::format("xyz {}, {} in the other file", ShowVector(t), ShowAngles(R));
+  const std::string values = fmt::format("xyz {} m, {} in the other file", ShowVector(t), ShowAngles(R));
   const auto offer = [&](CorrectionKind kind, double bits) {
     Try(origin.Make(kind, SiteKind::kPosition, bits, values, true), origin.link, [=](PrintedLink* link) {
       link->origin.SetRotation(R);
@@ -217,7 +220,7 @@ void CandidateSearch::SearchRowNumbers(const Origin& origin) {
   const auto show = [](const Vector4d& numbers) -> Vector4d {
     return numbers.cwiseProduct(Vector4d(RadToDeg(1.0), 1.0, RadToDeg(1.0), 1.0));
   };
-  const auto [bits, values] = CompareEntries(kNames, show(given), show(right), show(open));
+  const auto [bits, values] = CompareEntries(kNames, show(given), show(right), show(open), "");
   Try(origin.Make(CorrectionKind::kNumber, SiteKind::kPosition, bits, values, true), origin.link,
       [row](PrintedLink* link) { link->origin = row; });
 }
@@ -284,7 +287,7 @@ void CandidateSearch::SearchWeld(int link) {
   const Vector3d t = right.com - origin.CalcRotation() * given.com;
   const Vector3d open =
       Vector3d::Constant(pair_.given(home).body_tolerance.com.norm() * whole.mass / alone->mass + 1e-6);
-  const auto [bits, values] = CompareEntries(kAxisNames, origin.t, t, open);
+  const auto [bits, values] = CompareEntries(kAxisNames, origin.t, t, open, " m");
   const bool is_missing = origin.t.isZero();
   Try({{is_missing ? CorrectionKind::kMissing : CorrectionKind::kNumber, SiteKind::kPosition},
        is_missing ? 3.0 + 0.25 * bits : bits,

@@ -11,10 +11,11 @@ using P = PartKind;
 using I = Constant::Index;
 
 std::string DescribeDamping(const Joint& joint, double value, double least_inertia) {
-  return fmt::format(": rates of {} decay within {:.2g} s", joint.name, least_inertia / value);
+  return fmt::format(": the velocity of {} decays in {:.2g} s", joint.name, least_inertia / value);
 }
 std::string DescribeArmature(const Joint& joint, double value, double least_inertia) {
-  return fmt::format(": M of {} by up to {:.2g} %", joint.name, 100.0 * value / (least_inertia - value));
+  return fmt::format(": M of {} grows by up to {:.2g} %", joint.name,
+                     100.0 * value / (least_inertia - value));
 }
 std::string DescribeDryFriction(const Joint& joint, double value, double least_inertia) {
   return fmt::format(": {} is slowed by up to {:.2g} {}", joint.name, value / least_inertia,

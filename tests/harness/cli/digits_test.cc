@@ -87,15 +87,15 @@ TEST_F(Digits, OfFewDigitsHideNoMistake) {
   Write("right.urdf", MakeFinger(R"(ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0")"));
   const std::pair<std::string, std::string> cases[] = {
       {MakeFinger(R"(ixx="0.0002" iyy="0.0002" izz="0.0002" ixy="0")"),
-       "ixx 0.0002 here, 0.0001 in the other file"},
+       "ixx 0.0002 kg m^2 here, 0.0001 kg m^2 in the other file"},
       {MakeFinger(R"(ixx="0.0001" iyy="0.0002" izz="0.00021" ixy="0")"),
-       "izz 0.00021 here, 0.0002 in the other file"},
+       "izz 0.00021 kg m^2 here, 0.0002 kg m^2 in the other file"},
       {MakeFinger(R"(ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0.00001")"),
-       "ixy 1e-05 here, 0 in the other file"},
+       "ixy 1e-05 kg m^2 here, 0 kg m^2 in the other file"},
       {MakeFinger(R"(ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0")", "0.01 0.002 0"),
-       "y 0.002 here, 0 in the other file"},
+       "y 0.002 m here, 0 m in the other file"},
       {MakeFinger(R"(ixx="0.0001" iyy="0.0002" izz="0.0002" ixy="0")", "0.01 0 0", "0.051"),
-       "mass differs: 0.051 here, 0.05 in the other file"}};
+       "mass differs: 0.051 kg here, 0.05 kg in the other file"}};
   for (const auto& [wrong, value] : cases) {
     SCOPED_TRACE(value);
     Write("wrong.urdf", wrong);
@@ -130,8 +130,8 @@ TEST_F(Digits, APlacementIsToldAsItsFileHasIt) {
   const std::string right = MakeFinger(R"(ixx="0.000123" iyy="0.000234" izz="0.000245" ixy="0")");
   Write("right.urdf", right);
   const std::pair<Edit, std::string> cases[] = {
-      {{"xyz=\"0 0.02 0.1\"", "xyz=\"0 0.02 0.13\""}, "position differs: z 0.13 here, 0.1 in the other file"},
-      {{"rpy=\"0.3 0 0\"", "rpy=\"0.5 0 0\""}, "rotation differs: roll 0.5 here, 0.3 in the other file"},
+      {{"xyz=\"0 0.02 0.1\"", "xyz=\"0 0.02 0.13\""}, "position differs: z 0.13 m here, 0.1 m in the other file"},
+      {{"rpy=\"0.3 0 0\"", "rpy=\"0.5 0 0\""}, "rotation differs: roll 0.5 rad here, 0.3 rad in the other file"},
       {{"axis xyz=\"0 1 0\"", "axis xyz=\"0 -1 0\""}, "axis with the other sign"}};
   for (const auto& [edit, words] : cases) {
     Write("wrong.urdf", ApplyEdits(right, {edit}));

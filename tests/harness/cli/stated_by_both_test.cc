@@ -106,7 +106,7 @@ TEST_F(StatedByBoth, LimitsOfMotorsAreComparedWhereBothStateThem) {
   const Json later = Compare(1, "a.urdf", "c.xml");
   ASSERT_EQ(later.at("causes").size(), 1U);
   EXPECT_EQ(later.at("causes")[0].at("text"),
-            "joint elbow: effort limit differs: 1 here, 0.6 in the other file");
+            "joint elbow: effort limit differs: 1 N m here, 0.6 N m in the other file");
   // Two URDFs.
   WriteChanged("c.urdf", kUrdf, "upper=\"1\" effort=\"1\"", "upper=\"1\" effort=\"1.2\"");
   EXPECT_TRUE(
