@@ -171,15 +171,10 @@ class GeomAdder {
   void operator()(const Arrow& arrow) {
     const Vector3d along = arrow.to - arrow.from;
     if (along.norm() <= arrow.radius) return;
-    mjvGeom& geom = Add(mjGEOM_ARROW, arrow.color);
     // The engine draws arrows half as long as their given length.
-    const Vector3d end = arrow.from + 2.0 * along;
-    MakeConnector(mjGEOM_ARROW, arrow.radius, arrow.from.data(), end.data(), &geom);
-  }
-
-  void operator()(const Rod& rod) {
-    MakeConnector(mjGEOM_CAPSULE, rod.radius, rod.from.data(), rod.to.data(),
-                  &Add(mjGEOM_CAPSULE, rod.color));
+    const Vector3d end = arrow.from + (arrow.has_tip ? 2.0 : 1.0) * along;
+    const int type = arrow.has_tip ? mjGEOM_ARROW : mjGEOM_CAPSULE;
+    MakeConnector(type, arrow.radius, arrow.from.data(), end.data(), &Add(type, arrow.color));
   }
 
   void operator()(const Cone& cone) {

@@ -61,20 +61,13 @@ inline constexpr const char* kCourseCamera = "course";
 
 // Decorations: shapes drawn into the scene besides the model's own geoms. Points in world coordinates, m.
 
-/// A force or another vector.
+/// A force or another vector; without a tip a piece of a line.
 struct Arrow {
   Vector3d from;
   Vector3d to;
   double radius;  ///< Of the shaft, m.
   Color color;
-};
-
-/// A piece of a line.
-struct Rod {
-  Vector3d from;
-  Vector3d to;
-  double radius;  ///< m.
-  Color color;
+  bool has_tip = true;
 };
 
 /// The forces that Coulomb friction allows: a cone that opens from its apex along its axis.
@@ -86,7 +79,7 @@ struct Cone {
   Color color;
 };
 
-using Decoration = std::variant<Arrow, Rod, Cone>;
+using Decoration = std::variant<Arrow, Cone>;
 
 struct RenderOptions {
   int width = 1280;

@@ -175,10 +175,10 @@ std::vector<Decoration> MakeWay(const RunFrames& run) {
     if (row == 0) from = to;
     const double piece = (to - from).norm();
     if (!(piece > kPiece)) continue;
-    way.emplace_back(Rod{from, to, kRadius, color});
+    way.emplace_back(Arrow{from, to, kRadius, color, false});
     if (std::floor(length + piece) > std::floor(length)) {
       const Vector3d across = kHalfBar * Vector3d::UnitZ().cross(to - from) / piece;
-      way.emplace_back(Rod{to - across, to + across, kRadius, color});
+      way.emplace_back(Arrow{to - across, to + across, kRadius, color, false});
     }
     length += piece;
     from = to;

@@ -113,7 +113,7 @@ const CheckInfo kChecks[] = {
     // 1e9 steps.
     {{"closed_loop_spectral_radius", kLaw, "1"},
      {1.0 - 1e-9, "an error that settles within 1e9 steps", Scaling::kNone, "1 - 1e-9"},
-     "largest eigenvalue of (57) with the scenario's gains, sampled as the controller does it",
+     "largest eigenvalue of the sampled (57) with the scenario's gains",
      {Cause::kControlLaw, Rank::kLaw, kOwn},
      {[](const Analysis& a) { return When(true, a.spectral_radius); }, kRunning}},
     {{"measurement", kLaw, "1"},
@@ -126,7 +126,7 @@ const CheckInfo kChecks[] = {
       "rounding of the terms, 1e-15, through Gram matrices of condition number^2; the condition number is "
       "divided out",
       Scaling::kNone, nullptr, kRelative},
-     "tau' sent against (53)-(55) computed from the engine's terms, relative to the forces balanced and to "
+     "tau' sent against (53)-(55) computed from the engine's terms, relative to the forces that balance and "
      "the condition number of J_B'",
      {Cause::kControlLaw, Rank::kLaw, kOwn},
      {OfLaw<&LawErrors::torque>, kAlways | kUnsent}},
@@ -168,8 +168,8 @@ const CheckInfo kChecks[] = {
     // times a condition number of some tens. Measured 1.2e-9 m in `curve`.
     {{"error_dynamics", kLaw, "m"},
      {1e-8, "what law_demand leaves is held by K_p alone", Scaling::kPositionGain, "4e-6 m/s^2 / K_p"},
-     "object's position against (57) integrated beside the run, driven by the accelerations that the "
-     "prediction missed",
+     "object's position against the integrated (57), with the accelerations that the prediction missed as "
+     "input",
      {Cause::kUnexplained, Rank::kResidual},
      {OfLaw<&LawErrors::error_dynamics>, kRunning}},
     {{"orientation_dynamics", kLaw, "rad"},
@@ -193,8 +193,8 @@ const CheckInfo kChecks[] = {
     // Measured 1e-14 for the Panda.
     {{"joint_dynamics", kLaw, "rad"},
      {1e-11, "rounding of torques, over the least inertia that they drive and over K_p"},
-     "joints against e_ddot + K_v e_dot + K_p e = 0 integrated beside the run, driven by the accelerations "
-     "that the prediction missed",
+     "joint errors against the integrated e_ddot + K_v e_dot + K_p e = 0, with the accelerations that the "
+     "prediction missed as input",
      {Cause::kUnexplained, Rank::kResidual},
      {OfLaw<&LawErrors::error_dynamics>, kRunning}},
     {{"expect_joints", kLaw, "rad"},
@@ -208,7 +208,7 @@ const CheckInfo kChecks[] = {
     // These two compare the whole robot at the true state, where joints that do not accelerate show as well.
     {{"mass_matrix", kModel, "1"},
      {1e-13, "rounding: 16 eps for each joint of a chain of 25", Scaling::kNone, nullptr, kRelative},
-     "M of the whole robot against the engine's, over the sizes that are summed",
+     "M of the whole robot against the engine's, relative to the summands",
      {Cause::kModel, Rank::kResidual},
      {[](const Analysis& a) { return At(a.whole.mass); }, kAlways, DescribeEntry}},
     {{"bias_force", kModel, "1"},
@@ -219,28 +219,28 @@ const CheckInfo kChecks[] = {
     // Measured 5e-16 over the shipped scenarios, falls and spinning wheels included.
     {{"equations_of_motion", kInverseDynamics, "1"},
      {1e-13, "as mass_matrix", Scaling::kNone, nullptr, kRelative},
-     "remainder of the equations of motion of the whole robot and its object with the engine's "
-     "accelerations and forces, less what its solver left over, over the sizes that are summed",
+     "residual of the equations of motion with the engine's accelerations and forces, without its solver's "
+     "remainder, relative to the summands",
      {Cause::kUnmodelledForce, Rank::kDecisive},
      {[](const Analysis& a) { return At(a.whole.residual); }, kAlways, DescribeEntry}},
     {{"inverse_dynamics_robot", kInverseDynamics, "1"},
      {1e-9, "rounding of forces that cancel, in the metric of the lightest links", Scaling::kNone, nullptr,
       kRelative},
-     "the robot's part of that, as (48) has it: in xi, against the forces balanced",
+     "the robot's part of that residual as in (48), relative to the forces that balance",
      {Cause::kUnmodelledForce, Rank::kDecisive},
      {[](const Analysis& a) { return When(true, a.robot.error); }}},
     // The object's dynamics have no other unknowns than its inertia and the contacts' geometry, which checks
     // of the model compare: where those hold, an unknown force acts on the object.
     {{"inverse_dynamics_object", kInverseDynamics, "1"},
      {1e-9, "rounding of the object's terms", Scaling::kNone, nullptr, kRelative},
-     "the object's part, as (19) has it: against the contact forces",
+     "the object's part of that residual as in (19), relative to the contact forces",
      {Cause::kUnmodelledForce, Rank::kObjectBalance},
      {[](const Analysis& a) { return When(true, a.object.error); }}},
     {{"constraint_force", kForwardDynamics, "1"},
      {kUnitRounding,
       "one operation, of sizes that count the operations on the row's place, rates and inertia"},
-     "largest difference of the engine's force of a contact, limit, dry friction or joined point and its "
-     "documented law's under the same motion, over the sizes that its rounding comes from",
+     "largest difference between an engine's constraint force and its documented law for the same motion, "
+     "relative to the rounded sizes",
      {Cause::kContactSoftness, Rank::kResidual},
      {[](const Analysis& a) -> Evaluation {
         if (a.step->response.rows.empty()) return std::nullopt;
@@ -252,13 +252,12 @@ const CheckInfo kChecks[] = {
     {{"reduced_acceleration", kAssumption, "1"},
      {1.0, "all that motors balance or is predicted: rigid contacts explain nothing any more",
       Scaling::kSofter, "1; 100 (1 - d) of softer contacts"},
-     "how far rigid contacts are from explaining the accelerations: xi_dot of the rigid constrained system "
-     "(46), (48) against the engine's",
+     "xi_dot of the rigid constrained system (46), (48) against the engine's",
      {Cause::kContactSoftness, Rank::kPrediction},
      {[](const Analysis& a) { return When(true, a.rigid.acceleration); }}},
     {{"contact_force", kAssumption, "1"},
      {1.0, "as reduced_acceleration", Scaling::kSofter, "1; 100 (1 - d) of softer contacts"},
-     "the same of the contact forces: f_c of that system against the engine's, relative to |f_c|",
+     "f_c of the rigid constrained system against the engine's, relative to |f_c|",
      {Cause::kContactSoftness, Rank::kPrediction},
      {[](const Analysis& a) { return When(true, a.rigid.contact_force); }}},
     // Slip and use of the cone distinguish sliding from contacts that only give.
@@ -390,13 +389,13 @@ const CheckInfo kChecks[] = {
     // rad, m: rounding of a joint that rests exactly at the end of its range, as a closed gripper does.
     {{"joint_limit", kAssumption, "rad"},
      {1e-12, "a limit pushes; less is rounding"},
-     "how far a joint is beyond its range, where a limit pushes that the model does not have",
+     "how far a joint is beyond its range, where a limit pushes that the model lacks",
      {Cause::kJointLimit, Rank::kDecisive, kOwn},
      {EvaluateJointLimit, kAlways, DescribeJoint}},
     // Ten times the accuracy of distances between bodies that are apart (solid.h).
     {{"clearance", kAssumption, "m"},
      {1e-6, "the bodies' distances are known to 1e-7 m"},
-     "how deep two bodies overlap that must not touch",
+     "overlap of two bodies that must not touch",
      {Cause::kCollision, Rank::kAssumption, kOwn},
      {[](const Analysis& a) { return At(a.deepest_overlap); }, kAlways | kUnsent,
       [](const StepAnalyzer& a, int part) { return part < 0 ? "" : a.clearance().Describe(part); }}},

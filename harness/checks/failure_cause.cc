@@ -14,15 +14,15 @@ struct Words {
 
 constexpr Words kWords[] = {
     {"none", ""},
-    {"sensing", "the controller gets wrong measurements"},
+    {"sensing", "the controller receives wrong measurements"},
     {"model", "the two descriptions of the robot differ"},
-    {"actuator", "the motors give other torques than were sent"},
+    {"actuator", "the motors deliver other torques than the controller sent"},
     {"unexplained", "the engine does not do what the equations say; no cause is known"},
-    {"control law", "the torques are not those of the law, or do not do what is expected"},
+    {"control law", "the torques differ from the control law's, or miss what the scenario expects"},
     {"fingertip rim", "a contact has rolled past the rim of a fingertip"},
     {"contact softness", "contacts creep without sliding"},
-    {"collision", "two bodies touch that must not"},
-    {"solver", "the engine's solver stopped before its forces fit its motion"},
+    {"collision", "two bodies touch that must stay apart"},
+    {"solver", "the engine's solver stopped before it converged"},
     {"tilt", "the platform does not stay level"},
     {"actuator limit", "a motor is at its limit"},
     {"fingertip slip", "a fingertip slides"},
@@ -33,7 +33,8 @@ constexpr Words kWords[] = {
     {"slope", "the floor is not level"},
     {"unmodelled force", "a force acts that neither description has"},
     {"joint limit", "a joint is at the end of its range"},
-    {"declared imperfections", "the scenario's own plant, motors or sensors miss what it expects"}};
+    {"declared imperfections",
+     "the declared imperfections of plant, motors or sensors cost more than the scenario expects"}};
 static_assert(std::size(kWords) == static_cast<size_t>(Cause::kDeclared) + 1);
 
 }  // namespace

@@ -52,12 +52,12 @@ void AddFindings(const AuditRequest& request, const RobotDescription& robot, con
   const std::string file = request.robot.filename().string();
   const auto counted = std::ranges::count_if(
       result.findings, [](const AuditFinding& finding) { return finding.level != AuditLevel::kNote; });
-  report->answer = {.word = "GOOD", .sentence = "nothing that a robot cannot have, and nothing suspicious."};
+  report->answer = {.word = "GOOD", .sentence = "no impossible and no suspicious values."};
   if (counted > 0)
-    report->answer = {Answer::Tone::kBad, "FOUND",
-                      fmt::format("{} {}.", counted,
-                                  counted == 1 ? "thing that a robot cannot have or that looks like a fault"
-                                               : "things that a robot cannot have or that look like faults")};
+    report->answer = {
+        Answer::Tone::kBad, "FOUND",
+        fmt::format("{} {}.", counted,
+                    counted == 1 ? "impossible or suspicious value" : "impossible or suspicious values")};
   report->details = fmt::format(
       "\n{}: {}, {} joints, {} links\ncondition number of M: {} (median of random states)\n\n",
       robot.spec.name, file, robot.spec.joints.size(), robot.parts.size(), FormatCondition(result.condition));
@@ -66,7 +66,7 @@ void AddFindings(const AuditRequest& request, const RobotDescription& robot, con
                                    finding.line > 0 ? fmt::format("{}:{}", file, finding.line) : file,
                                    Abbreviate(finding.where), finding.text);
     if (finding.condition_without) {
-      line += "; with a plausible body there M's condition number is " +
+      line += "; with a plausible inertia, M's condition number would be " +
               FormatCondition(*finding.condition_without);
     }
     report->Add(line, 11);
@@ -104,7 +104,7 @@ int Run(const AuditRequest& request) {
 
 void AddAuditCommand(CLI::App* app) {
   const auto [command, request] = AddRequest<AuditRequest>(
-      app, "audit", "Look for what cannot be, or is suspicious, in one description of a robot",
+      app, "audit", "Find impossible and suspicious values in one description of a robot",
       {"dexcheck audit arm.urdf", "dexcheck audit arm.xml --junit audit.xml"});
   AddOption(command, "FILE", &request->robot, "Parameter file (TOML), URDF or MJCF")
       ->type_name("FILE")

@@ -79,8 +79,7 @@ int Run(const BudgetRequest& request) {
 
 void AddBudgetCommand(CLI::App* app) {
   const auto [command, request] = AddRequest<BudgetRequest>(
-      app, "budget",
-      "Which part of a plant that is not ideal costs the accuracy: each alone, all but each, all",
+      app, "budget", "Show which declared imperfection costs the accuracy: each alone, all but one, all",
       {"dexcheck budget curve-real", "dexcheck budget motion.toml --set duration=2"});
   AddOption(command, "SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file")
       ->required();

@@ -293,7 +293,7 @@ CLI::Option* AddIgnoreOption(CLI::App* command, std::vector<std::string>* ignore
 
 void AddUrdfOptions(CLI::App* command, UrdfOptions* options) {
   AddOption(command, "--package PATH", &options->packages,
-            "Folder of a URDF's packages; its meshes are looked for")
+            "Folder of a URDF's packages, where its meshes are")
       ->allow_extra_args(false);
   command->add_flag("--floating", options->floating, "The root of a URDF floats");
 }

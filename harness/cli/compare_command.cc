@@ -119,7 +119,6 @@ int Run(CompareRequest request) {
                 .data = ToJson(comparison, request.run_folders),
                 .page = [&] { return MakeComparisonPage(pointers, request.run_folders, comparison); }};
   AddDetails(request, comparison, &report);
-  if (!request.page_file.empty()) report.details += "page: " + request.page_file + "\n";
   if (request.tolerance && !comparison.IsSame()) report.code = kDisagreement;
   const ExitCode code = files.Write(report);
   if (code != kSuccess && comparison.signals.empty()) throw InputError("--tolerance: no signal was compared");

@@ -52,7 +52,6 @@ int Run(ConsistencyRequest request) {
   bar.Finish();
   Report report =
       MakeReport(request, comparison, files.prints() ? TryRepair(request, comparison) : RepairTrial());
-  if (!request.page_file.empty()) report.last = "page: " + request.page_file + "\n";
   report.page = [&] { return MakePage(request, comparison, report.data); };
   return files.Write(report);
 }

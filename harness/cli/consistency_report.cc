@@ -248,24 +248,24 @@ void AddTables(const ConsistencyRequest& request, const Comparison& comparison, 
   const std::vector<CheckRecord>& constants = result.constants.records;
   if (!constants.empty()) AddRecords("constant", constants, comparison, nullptr, &rows);
   if (!result.constants.notes.empty()) {
-    rows.push_back({{},
-                    fmt::format("{} notes on what only a run has (contacts, solver, motors' limits): --json",
-                                result.constants.notes.size())});
+    rows.push_back(
+        {{},
+         fmt::format("{} notes on contacts, solver and motors' limits, which matter in runs: --json",
+                     result.constants.notes.size())});
   }
   if (!rows.empty()) rows.emplace_back();
   AddRecords("term", result.terms, comparison, &model, &rows);
   report->AddTable(ListsAll(comparison) ? "<>>>><" : "<>><", rows);
   const std::string bounds = request.judging.Find()
-                                 ? "bounds are those of rounding or the tolerance given, whichever is wider"
+                                 ? "bounds are the given tolerance, or rounding where that is wider"
                                  : "bounds follow from rounding";
   const std::string digits =
       comparison.digits
-          ? fmt::format(
-                " Larger differences were compared with the printed precision of the files ({} states).",
-                comparison.digits->states)
+          ? fmt::format(" Larger ones were compared with the files' printed digits at {} states.",
+                        comparison.digits->states)
           : "";
-  report->Add("\nErrors are relative to each term's own scale; " + bounds + " (README.md)." + digits +
-                  " --json says where each is worst.",
+  report->Add("\nErrors are relative to each term's scale; " + bounds + " (harness/README.md)." + digits +
+                  " --json gives the place of each.",
               0);
 }
 

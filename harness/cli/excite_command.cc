@@ -82,7 +82,7 @@ Report MakeReport(const MotionRequest& request, const RobotModel& model, const M
   torques.emplace_back();
   report.AddTable("<>", torques);
   report.last = fmt::format(
-      "{}: {} of {} combinations of sizes are known to a third of what is plausible, {} before.\n",
+      "{}: {} of {} combinations of parameters are known to a third of their plausible range, {} before.\n",
       complete ? "FOUND" : "INTERRUPTED, so far", design.known_after, design.combinations,
       design.known_before);
   if (!complete) report.failure = "interrupted";
@@ -124,15 +124,14 @@ int Run(MotionRequest request) {
 
 void AddExciteCommand(CLI::App* app) {
   const auto [command, request] = AddRequest<MotionRequest>(
-      app, "excite",
-      "Make a motion to record with a robot, in which errors of its model show best within limits",
+      app, "excite", "Design a motion to record that shows errors of a robot's model best within its limits",
       {"dexcheck excite arm.urdf --out motion.csv", "dexcheck excite arm.urdf --limits limits.toml"});
   AddOption(command, "MODEL,--model", &request->model, "The robot: a parameter file, URDF or MJCF")
       ->required();
   AddOption(command, "--out FILE.csv", &request->motion_file,
             "The motion: t, q, qd, qdd and the model's torques");
   AddOption(command, "--recording FILE", &request->recorded,
-            "What was recorded already: the motion adds to it")
+            "An existing recording, which the motion complements")
       ->allow_extra_args(false);
   AddOption(command, "--columns FILE.toml", &request->columns, "Which column of the recordings is what");
   AddOption(command, "--limits FILE.toml", &request->limits, "Ranges, velocities, accelerations and torques");
@@ -146,7 +145,7 @@ void AddExciteCommand(CLI::App* app) {
   AddOption(command, "--motions N", &request->options.evaluations, "How many motions to try")
       ->check(WholeNumber(1, 1000000))
       ->capture_default_str();
-  AddSeedOption(command, &request->options.seed, "Of the motions that are drawn at first");
+  AddSeedOption(command, &request->options.seed, "Seed of the first random motions");
   AddJsonOption(command, "the results", &request->json_file);
   command->add_flag("--quiet", request->quiet, "Print the last line only");
 }

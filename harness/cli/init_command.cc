@@ -190,11 +190,11 @@ std::string MakeRobotFolder(const InitRequest& request, const std::string& out, 
   fmt::print("{}: robot.toml, robot.xml, motion.toml, gains.toml, .github/workflows/dexcheck.yml\n",
              folder.string());
   if (is_made)
-    fmt::print("robot.xml was made of {}: what is wrong there is wrong in both\n",
+    fmt::print("robot.xml was made from {}, so that an error of that file is in both\n",
                request.robot.filename().string());
   if (differ)
-    fmt::print("the two differ, and a run will say so: dexcheck consistency {} {}\n", request.robot.string(),
-               (folder / "robot.xml").string());
+    fmt::print("the two files differ, so that a run fails; compare them: dexcheck consistency {} {}\n",
+               request.robot.string(), (folder / "robot.xml").string());
   fmt::print(
       "next: cd {} && dexcheck run motion.toml\n      dexcheck study run gains.toml --db gains.db\n"
       "      dexcheck budget motion.toml --set actuation.delay=0.002 --set {}\n",
@@ -210,7 +210,7 @@ int InitRobot(const InitRequest& request) {
   if (!why.empty() && stands) why = MakeRobotFolder(request, out, "its run does not pass: " + why, &stands);
   if (!why.empty())
     throw InputError(
-        fmt::format("{}: no motion of it, however small, passes its run: {}", request.robot.string(), why));
+        fmt::format("{}: even the smallest motion fails its run: {}", request.robot.string(), why));
   return kSuccess;
 }
 

@@ -223,7 +223,7 @@ Report MakeReport(const RobotModel& model, const RecordingPair& pair, const Reco
   Answer& answer = report.answer;
   if (comparison.causes.empty()) {
     answer.word = "SAME";
-    answer.sentence = fmt::format("what {} does not explain is the same in both.", model.name());
+    answer.sentence = fmt::format("the residuals of {} are equal in both.", model.name());
   } else {
     answer.tone = Answer::Tone::kBad;
     answer.word = "DIFFER";
@@ -232,7 +232,7 @@ Report MakeReport(const RobotModel& model, const RecordingPair& pair, const Reco
   }
   for (const CauseDifference& one : comparison.causes) answer.causes.push_back(one.Describe());
   if (!comparison.is_same_motion) {
-    answer.remarks.emplace_back("the motions are not the same: only what explains them is compared");
+    answer.remarks.emplace_back("the motions differ, so that only their causes are compared");
     return report;
   }
   constexpr double kLeast = 1e-6;  // s
@@ -281,9 +281,8 @@ void AddJudgeCommand(CLI::App* app) {
   AddOption(command, "--columns FILE.toml", &request->columns,
             "Which column is what; --describe writes one to start from");
   command->add_flag("--describe", request->describe,
-                    "Print what the recording's columns are taken for, as a file of columns");
-  AddOption(command, "--write FILE", &request->corrected,
-            "Write a copy of MODEL in which what was found is put right");
+                    "Print how the recording's columns are understood, as a file of columns");
+  AddOption(command, "--write FILE", &request->corrected, "Write a copy of MODEL with the causes corrected");
   AddUrdfOptions(command, &request->urdf);
   AddJsonOption(command, "the judgement", &request->json_file);
   AddOption(command, "--page FILE.html", &request->page_file,

@@ -65,10 +65,10 @@ int MutateFiles(MutateRequest request) {
   request.options.diagnose = !request.no_diagnosis;
   const DescriptionFile robot(request.files.robot);
   if (robot.format() != RobotFormat::kToml)
-    throw InputError(request.files.robot.string() + ": must be a parameter file to be changed on purpose");
+    throw InputError(request.files.robot.string() + ": must be a parameter file to get faults");
   const MutatedPair pair(robot, DescriptionFile(request.files.mjcf));
   const RobotModel& model = pair.model;
-  RequireNoBalls(model, "when each number is changed on purpose");
+  RequireNoBalls(model, "when faults are injected into each number");
   const Adapter adapter(model, *pair.engine, pair.source);
   CatchInterrupts();
   ReportOutput output(request);
@@ -77,7 +77,7 @@ int MutateFiles(MutateRequest request) {
   unchanged.seed = request.options.seed;
   if (!CheckConsistency(adapter, unchanged, [](long) { return true; }).Agrees()) {
     throw InputError(request.files.robot.string() + ": must agree with " + pair.source +
-                     " before it is changed on purpose (see dexcheck diagnose), got a disagreement");
+                     " before faults are injected (see dexcheck diagnose), got a disagreement");
   }
 
   std::vector<Mutant> mutants = ListMutants(model.spec(), request.options.scale);
@@ -222,8 +222,7 @@ int MutateRun(const MutateRequest& request) {
 void AddMutateCommand(CLI::App* app) {
   const auto request = std::make_shared<MutateRequest>();
   CLI::App* command = AddCommand(
-      app, "mutate",
-      "Change every number and equation of the model on purpose: which faults are found and named?",
+      app, "mutate", "Inject faults into numbers and equations, and count which are found and named",
       {"dexcheck mutate arm.toml arm.xml", "dexcheck mutate panda-reach --draws 20 --page faults.html"});
   AddFileOptions(
       command,
@@ -234,37 +233,38 @@ void AddMutateCommand(CLI::App* app) {
       ->capture_default_str();
   AddOverrideOptions(command, &request->overrides);
   AddOption(command, "--from T", &request->run.from,
-            "In a run: when the fault begins, s; in a motion of joints it is there from the first")
+            "In a run: when the fault begins, s; in a joint motion it begins at once")
       ->check(NumberFrom(0.0, 1e4))
       ->capture_default_str();
   AddOption(command, "--duration T", &request->duration,
-            "In a run: how long it is looked at, s (default 0.1; faults that are drawn "
-            "in a motion of joints, or not found, are looked at to its end)")
+            "In a run: time after the fault, s (default 0.1; random faults of a joint motion, and faults not "
+            "found, run to the end)")
       ->check(NumberFrom(1e-3, 1e4));
   AddOption(command, "--numbers N", &request->run.parameters,
-            "In a run: how many numbers of the model are changed, evenly out of all")
+            "In a run: how many parameters of the model are changed, evenly spread over all")
       ->check(WholeNumber(0, 100000))
       ->capture_default_str();
   CLI::Option* const draws =
-      AddOption(command, "--draws N", &request->run.draws,
-                "In a run: sets of faults whose places, sizes and times are drawn, and "
-                "whether they are named, in the place of the others")
+      AddOption(
+          command, "--draws N", &request->run.draws,
+          "In a run: number of random sets of faults (place, size, time), instead of the systematic ones")
           ->check(WholeNumber(1, 100000));
   AddOption(command, "--together N", &request->run.together, "With --draws: faults at once")
       ->check(WholeNumber(1, 5))
       ->needs(draws)
       ->capture_default_str();
-  AddOption(command, "--draw-seed N", &request->run.seed, "In a run: what is drawn")
+  AddOption(command, "--draw-seed N", &request->run.seed, "In a run: seed of the random sets")
       ->check(WholeNumber(0, 1000000))
       ->capture_default_str();
   AddOption(command, "--kinds KIND,...", &request->run.kinds,
-            "In a run: out of which kinds of faults is drawn: motor, sensor, joint, body, floor, wheels, "
-            "contact, solver, law (default: all)")
+            "In a run: kinds of the random faults: motor, sensor, joint, body, floor, wheels, contact, "
+            "solver, law (default: all)")
       ->delimiter(',');
   AddSampleOptions(command, 1000, &request->options.samples, &request->options.seed);
-  command->add_flag("--no-diagnosis", request->no_diagnosis, "Only whether each is found, not what is named");
+  command->add_flag("--no-diagnosis", request->no_diagnosis,
+                    "Count which faults are found, without naming causes");
   AddOption(command, "--page FILE.html", &request->page_file,
-            "In a run: an HTML page with what was made, what was found, and how it was named");
+            "In a run: an HTML page of the injected, found and named faults");
   AddJobsOption(command, "Faults", &request->jobs);
   AddJsonOption(command, "the results, from which an interrupted campaign goes on,", &request->json_file);
   command->add_flag("--quiet", request->quiet, "Print the verdict only");

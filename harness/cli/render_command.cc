@@ -142,8 +142,8 @@ void AddRenderCommand(CLI::App* app) {
             "A video .mp4, or a picture .png (default: video.mp4 or still.png in RUN_DIR)");
   AddOption(command, "--still T", &request->still, "One picture at this time of the run, s");
   AddOption(command, "--camera NAME", &request->video.camera,
-            "overview (the default), follow, grasp, top, or another of the MJCF's; robot and object "
-            "are near to those; course stands still and sees the whole way");
+            "overview (the default), follow, grasp, top, or another of the MJCF's; robot, object: close-ups; "
+            "course: fixed, sees the whole way");
   AddOption(command, "--inset NAME", &request->video.inset, "A second camera in the lower right corner");
   AddOption(command, "--size WxH", &request->size, "Size of the picture in pixels")->capture_default_str();
   AddOption(command, "--fps N", &request->video.fps, "Frames a second")

@@ -279,6 +279,7 @@ ReportOutput::ReportOutput(const Outputs& outputs)
 
 ExitCode ReportOutput::Write(const Report& report, bool is_printed) {
   is_printed = is_printed && prints();
+  const std::string page = page_.exists() ? "page: " + page_.path().string() + "\n" : "";
   if (json_.exists()) json_.Write(report.data);
   junit_.Write([&] { return WriteJUnit(report); });
   page_.Write(report.page);
@@ -286,6 +287,7 @@ ExitCode ReportOutput::Write(const Report& report, bool is_printed) {
     if (!report.answer.word.empty()) PrintAnswer(report.answer);
     if (!quiet_) fmt::print("{}", report.details);
     fmt::print("{}", report.last);
+    fmt::print("{}", page);
   }
   if (report.code == kDisagreement || report.failure.empty()) return report.code;
   return ReportFailure(report.failure);

@@ -103,6 +103,7 @@ class OutputFile {
   void Finish();
 
   [[nodiscard]] bool exists() const { return file_ != nullptr; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   /// The results take standard output: other text would spoil them.
   [[nodiscard]] bool is_stdout() const { return file_ == stdout; }
 

@@ -129,7 +129,7 @@ int RunScenario(const RunRequest& request) {
                                                 QuoteForShell(files.mjcf.string())));
   if (request.gains)
     report.last =
-        "\n" + (result.gain_card.empty() ? "no margins: they are those of a joint motion under its law\n"
+        "\n" + (result.gain_card.empty() ? "no margins: only a joint motion under its law has them\n"
                                          : result.gain_card);
   const ExitCode verdict = result.verdict == Verdict::kFailed ? kFailure : report.code;
   std::exception_ptr unprinted;
@@ -178,10 +178,10 @@ int ReplayRun(const RunRequest& request) {
   recorder.Close("");
   const ReplayDifference difference = recorded.Compare(log);
   if (!cut.empty()) {
-    fmt::print("Not the whole run, {} steps, is compared: {}.\n", runner.loop().num_steps(), cut);
+    fmt::print("Only {} steps are compared: {}.\n", runner.loop().num_steps(), cut);
   }
   for (const OldName& old : difference.replaced)
-    fmt::print("Not compared: {}, in whose place are now {}.\n", old.old, old.now);
+    fmt::print("Not compared: {}, which {} replaced.\n", old.old, old.now);
   if (difference.signal.empty()) {
     fmt::print("IDENTICAL: {} steps of {} signals, bit for bit.\n", difference.rows, difference.signals);
     return kSuccess;

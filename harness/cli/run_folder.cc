@@ -158,7 +158,7 @@ RecordedRun::RecordedRun(const std::filesystem::path& folder, const std::vector<
   const std::string named = own.exists() ? own.run : log_.FindText("controller");
   if (controller.empty() && !named.empty())
     throw InputError((folder / "log.h5").string() +
-                     ": names a controller, which no log starts; give it anew: --controller " +
+                     ": the run had a controller of your own; name it again: --controller " +
                      QuoteForShell(named));
   files_.robot = FindEmbedded(log_, "robot", unpacked_.path());
   files_.mjcf = FindEmbedded(log_, "mjcf", unpacked_.path());

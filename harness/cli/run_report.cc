@@ -30,12 +30,18 @@ std::string PaintStatus(const CheckRecord& check) {
   return check.failed ? Paint(Tone::kBad, status) : status == "ok" ? Paint(Tone::kGood, status) : status;
 }
 
+/// Returns "inverse" of "inverse_dynamics", so that lines have at most 80 letters.
+std::string NameShortly(CheckCategory kind) {
+  const std::string name = NameOf(kind);
+  return name.substr(0, name.find('_'));
+}
+
 /// Adds a check's line to the table.
 /// @param count number of the checks that the line stands for; empty for one.
 void AddCheck(const CheckRecord& check, const std::string& count, std::vector<TableRow>* rows) {
   if (!check.applies || check.is_empty) return;
   TableRow& row = rows->emplace_back();
-  row.cells = {NameOf(check.kind), count, check.name};
+  row.cells = {NameShortly(check.kind), count, check.name};
   if (!IsReached(check)) {
     row.cells.insert(row.cells.end(), {"-", "", "", "unreached"});
     return;
@@ -67,12 +73,12 @@ void AddCategory(CheckCategory kind, const ClosedLoop& loop, std::vector<TableRo
   const bool is_asked =
       passing.is_asked() || !failing.empty();  // contacts of an arm that touches nothing are not
   if (is_asked && passing.not_reached > 0)
-    rows->push_back({{NameOf(kind), std::to_string(passing.not_reached), "not reached"}});
+    rows->push_back({{NameShortly(kind), std::to_string(passing.not_reached), "not reached"}});
 }
 
 void AddChecks(const Setup& setup, const ClosedLoop& loop, bool all, Report* report) {
   std::vector<TableRow> rows = {
-      {{"category", "", all ? "check" : "checks, nearest to its bound", "worst", "bound"}}};
+      {{"category", "", all ? "check" : "check nearest to its bound", "worst", "bound"}}};
   const auto& constants = setup.constants().records;
   const auto differs = std::ranges::count_if(constants, [](const CheckRecord& r) { return r.failed; });
   rows.push_back({{"model", std::to_string(constants.size()),
@@ -108,7 +114,7 @@ void AddTask(const Json& task, Report* report) {
   const std::string failure = FindText(task, "/first_failure");
   if (!failure.empty()) report->Add("first attempt: " + failure);
   const double scale = task["weighed"];
-  if (scale != 1.0) report->Add(fmt::format("weighed: {:.3f} of the stated mass", scale));
+  if (scale != 1.0) report->Add(fmt::format("estimated mass: {:.3f} of the stated one", scale));
   report->Add(fmt::format("object pushed by {:.1e} m before it was held; largest step of a torque {:.1e} N m",
                           task["push_m"].get<double>(), task["torque_jump_max_N_m"].get<double>()));
 }
@@ -145,7 +151,7 @@ void AddRigidContacts(const RunChecks& checks, Report* report) {
   if (!checks.Has("reduced_acceleration") || !checks.Has("contact_force")) return;
   const CheckRecord& acceleration = checks.Find("reduced_acceleration");
   if (acceleration.count == 0) return;
-  report->Add(fmt::format("rigid contacts explain accelerations to {:.1e}, contact forces to {:.1e}",
+  report->Add(fmt::format("the rigid prediction misses accelerations by {:.1e}, contact forces by {:.1e}",
                           acceleration.worst, checks.Find("contact_force").worst));
 }
 
@@ -168,10 +174,9 @@ void AddDetails(const Setup& setup, const ClosedLoop& loop, const TrackingStatis
                           tracking.position.max, tracking.position.rms(), tracking.orientation.max));
   if (scenario.control.kappa == ContactSource::kIntegrated) {
     const ContactDrift& drift = loop.largest_drift();
-    report->Add(
-        fmt::format("contacts followed by (40): off by {:.2e} m on the object, {:.2e} m on the fingertip, "
-                    "{:.2e} rad in psi",
-                    drift.object, drift.fingertip, drift.psi));
+    report->Add(fmt::format(
+        "contact points by (40): errors {:.2e} m on the object, {:.2e} m on the fingertip, {:.2e} rad in psi",
+        drift.object, drift.fingertip, drift.psi));
   }
   if (summary.contains("torque_limited")) AddLimits(summary["torque_limited"], report);
   if (summary.contains("task")) AddTask(summary["task"], report);
@@ -182,7 +187,7 @@ void AddDetails(const Setup& setup, const ClosedLoop& loop, const TrackingStatis
   }
   const auto speed = [&](const char* key) { return summary["speed"][key].get<double>(); };
   report->Add(fmt::format(
-      "\n{:.1f} x real time; us/step: plant {:.0f}, controller {:.0f}, cross-check {:.0f}, recording {:.0f}",
+      "\n{:.1f} x real time; us per step: plant {:.0f}, controller {:.0f}, checks {:.0f}, log {:.0f}",
       speed("real_time_factor"), speed("plant_us_per_step"), speed("controller_us_per_step"),
       speed("cross_check_us_per_step"), speed("recording_us_per_step")));
 }

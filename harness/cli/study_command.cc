@@ -184,7 +184,8 @@ int RunStudy(const StudyRequest& request) {
   StudyInputs inputs = FindStudy(request.study, request.controller);
   const Study& study = inputs.study;
   if (study.is_search() && !request.shard.empty())
-    throw InputError("--shard: the trials of a search follow from one another: it is made by one command");
+    throw InputError(
+        "--shard: a search needs the results of its earlier trials, so that one command must run it");
   const std::vector<Trial> trials =
       study.is_search() ? std::vector<Trial>() : SelectShard(ListTrials(study), request.shard);
   CheckTrials(&inputs);
@@ -366,7 +367,7 @@ void AddStudyCommand(CLI::App* app) {
 
   AddReadCommands(study, request);
 
-  CLI::App* const slurm = AddCommand(study, "slurm", "Print an array job for Slurm that makes the study",
+  CLI::App* const slurm = AddCommand(study, "slurm", "Print an array job for Slurm that runs the study",
                                      {"dexcheck study slurm gains --tasks 16",
                                       "dexcheck study slurm my_study.toml --tasks 16 --time 01:00:00"});
   AddOption(slurm, "STUDY", &request->study, "Name of a shipped study, or a TOML file")->required();
@@ -390,7 +391,7 @@ void AddStudyCommand(CLI::App* app) {
   SetAction(slurm, [=] {
     StudyInputs inputs = FindStudy(request->study, request->controller);
     if (inputs.study.is_search() && job->tasks > 1)
-      throw InputError("--tasks: the trials of a search follow from one another: it is one task");
+      throw InputError("--tasks: a search needs the results of its earlier trials, so that it is one task");
     CheckTrials(&inputs);  // what study run would refuse, must not be queued
     fmt::print("{}", MakeSlurmScript(inputs, *request, *job));
     return kSuccess;

@@ -36,8 +36,7 @@ void NoteOthers(const Adapter& adapter, Comparison* comparison) {
   for (const int joint : adapter.other_joints())
     names.push_back(NameOf(adapter.engine(), mjOBJ_JOINT, joint));
   if (!names.empty()) {
-    comparison->not_compared.push_back("no part of the robot, since nothing joins them to it: joints " +
-                                       JoinNames(names));
+    comparison->not_compared.push_back("not connected to the robot: joints " + JoinNames(names));
   }
 }
 
@@ -48,7 +47,7 @@ void NoteTermsOfFrames(Comparison* comparison) {
   std::vector<std::string> names = comparison->result.not_compared;
   std::erase_if(names, [](const std::string& name) { return !IsOfFrames(name); });
   if (!names.empty())
-    comparison->not_compared.push_back("terms of frames, since the two have none in common: " +
+    comparison->not_compared.push_back("terms of frames, because the two share no frame: " +
                                        JoinNames(names));
 }
 
@@ -324,8 +323,8 @@ Comparison CompareFiles(DescriptionFile* a, DescriptionFile* b, const UrdfOption
   comparison.with_engine = is_mjcf && options.part.empty();
   if (is_mjcf && !comparison.with_engine)
     comparison.notes.push_back("part of a robot: the terms of " + second.path().filename().string() +
-                               " are those of what MuJoCo compiled, by the analytic model; what an MJCF has "
-                               "besides the mechanism is not compared");
+                               " are computed by the analytic model from what MuJoCo compiled; an MJCF's "
+                               "other contents are not compared");
   comparison.read_first = first.TryToDescribe();
   comparison.read_second = second.TryToDescribe();
   try {

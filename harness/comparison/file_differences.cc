@@ -101,13 +101,14 @@ Differences SortDifferences(const Comparison& comparison) {
   }
   for (const CheckRecord& record : comparison.result.terms) {
     if (!record.failed) continue;
-    add(record.worst,
-        fmt::format(
-            "{}: nearest the base: {}; worst: {}: {:.12g} in {}, {:.12g} in {} (sample {})", record.name,
-            Describe(record.first_failure, model, base), Describe(record.where, model, base),
-            record.model_value, comparison.with_engine ? "the model" : comparison.first.filename().string(),
-            record.engine_value, comparison.with_engine ? "MuJoCo" : comparison.second.filename().string(),
-            static_cast<long>(record.at)));
+    const int digits = std::clamp(CountDigits(record.worst) + 3, 6, 16);
+    add(record.worst, fmt::format("{}: first at {}; largest at {}: {:.{}g} in {}, {:.{}g} in {} (sample {})",
+                                  record.name, Describe(record.first_failure, model, base),
+                                  Describe(record.where, model, base), record.model_value, digits,
+                                  comparison.with_engine ? "the model" : comparison.first.filename().string(),
+                                  record.engine_value, digits,
+                                  comparison.with_engine ? "MuJoCo" : comparison.second.filename().string(),
+                                  static_cast<long>(record.at)));
   }
   return differences;
 }

@@ -163,8 +163,8 @@ std::optional<std::string> TakeCompiledInertias(const MjcfFile& mjcf, const mjMo
   }
   if (names.empty()) return std::nullopt;
   return fmt::format(
-      "inertias: MuJoCo's compiler diagonalises fullinertia and is up to {:.0e} off what the file states: "
-      "that difference is the engine's, and terms are with what it made of {}",
+      "inertias: MuJoCo's compiler diagonalises fullinertia, which changes it by up to {:.0e}; the terms use "
+      "its result for {}",
       largest, JoinNames(names));
 }
 

@@ -90,11 +90,11 @@ void NoteImpossibleBodies(RobotDescription* robot) {
   for (const Joint& joint : robot->spec.joints) check(joint.link, joint.body);
   if (names.empty()) return;
   robot->notes.push_back(
-      "bodies that none can be, since their principal moments break the triangle inequality (dexcheck audit "
-      "has them): " +
+      "impossible inertias, whose largest principal moment exceeds the sum of the others (dexcheck audit "
+      "lists them): " +
       JoinNames(names) +
-      ". The dynamics are well defined and are compared. MuJoCo's compiler refuses such a body, or with "
-      "balanceinertia gives it the mean of its moments: its copy differs there");
+      ". They are compared as they are. MuJoCo's compiler refuses such a body; with balanceinertia it "
+      "replaces the moments by their mean");
 }
 
 void LetBaseFloat(RobotDescription* robot) {

@@ -291,7 +291,7 @@ class UrdfReader {
       names.push_back(part.link->name);
     }
     if (names.empty()) return;
-    robot_.notes.push_back("inertials that no body can have, counted in what they are welded to: " +
+    robot_.notes.push_back("impossible inertials, merged into the link that they are welded to: " +
                            JoinNames(names));
   }
 

@@ -350,7 +350,8 @@ void CheckNumbers(MjcfFile* mjcf) {
       const size_t end = value.find_last_not_of(kBlanks) + 1;
       if (end < value.size() && IsAmong(kOpenLists, name) && IsNumbers(value.c_str(), false)) {
         element->SetAttribute(name.c_str(), value.substr(0, end).c_str());
-        mjcf->Note(*element, word, "without the blank at its end, at which 2.2.2 reads a number too many");
+        mjcf->Note(*element, word,
+                   "read without its last blank, after which 2.2.2 would read one more number");
       }
       const bool is_integer =
           IsAmong(kIntegers, name) || (kind == "texture" && (name == "width" || name == "height"));

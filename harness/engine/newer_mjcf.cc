@@ -251,13 +251,13 @@ class Downgrade {
         if (kHasImplicitFast || element->Attribute("integrator", value) == nullptr) continue;
         element->SetAttribute("integrator", other);
         mjcf_.Note(*element, "<option integrator>",
-                   std::string(value) + " written as " + other + ", which no term depends on");
+                   std::string(value) + " written as " + other + "; no term depends on it");
       }
     }
     if (!kHasImplicitFast && element->Attribute("dyntype", "filterexact") != nullptr) {
       element->SetAttribute("dyntype", "filter");
       mjcf_.Note(*element, "<" + std::string(name) + " dyntype>",
-                 "filterexact written as filter, which no term depends on");
+                 "filterexact written as filter; no term depends on it");
     }
     if (name == "joint" && !kHasPolynomials) {
       TakePolynomial(element, "damping");
@@ -334,7 +334,7 @@ void StateNewDefaults(MjcfFile* mjcf) {
   }
   XMLElement* const compiler = RequireSection(mjcf->root(), "compiler");
   compiler->SetAttribute("autolimits", "true");
-  mjcf->Note(*compiler, "<compiler autolimits>", "stated: true by default since MuJoCo 3.0.0");
+  mjcf->Note(*compiler, "<compiler autolimits>", "set to true, as MuJoCo 3 does");
 }
 
 }  // namespace dexcheck

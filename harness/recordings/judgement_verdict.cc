@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kLeast = 5e-3;  // explained, that is said
 
-/// Returns " of 0.1 N m at elbow, where an error below 0.2 N m (3 % of its torque) would not show", for the
-/// joint where that is the largest part.
+/// Returns "Noise of 0.1 N m at elbow hides errors below 0.2 N m (3 % of its torque)", for the joint where
+/// that is the largest part.
 std::string DescribeNoise(const RecordingJudgement& judgement, const RobotModel& robot) {
   static constexpr double kNone = 1e-300;  // N m or N, of a joint that the model gives no torque
   const auto part_of = [](const JointJudgement& one) { return one.hidden / std::max(one.modelled, kNone); };
@@ -25,9 +25,9 @@ std::string DescribeNoise(const RecordingJudgement& judgement, const RobotModel&
   const std::string share = worst.hidden < worst.modelled
                                 ? fmt::format("{:.2g} % of its torque", 100.0 * part_of(worst))
                                 : std::string("more than its torque");
-  return fmt::format(" of {:.2g} {} at {}, where an error below {:.2g} {} ({}) would not show", worst.noise,
-                     joint.type == JointType::kRevolute ? "N m" : "N", joint.name, worst.hidden,
-                     joint.type == JointType::kRevolute ? "N m" : "N", share);
+  const char* const unit = joint.type == JointType::kRevolute ? "N m" : "N";
+  return fmt::format("Noise of {:.2g} {} at {} hides errors below {:.2g} {} ({})", worst.noise, unit,
+                     joint.name, worst.hidden, unit, share);
 }
 
 /// Lists the causes, the nearest ones of what nothing explains, and how well both predict what was held out.
@@ -51,10 +51,9 @@ void AddCauses(const RecordingJudgement& judgement, Answer* answer) {
   const HeldPrediction &causes = judgement.by_causes, &all = judgement.by_all;
   if (all.held_left > 0.0)
     answer->remarks.push_back(fmt::format(
-        "test on a held-out quarter: {} number{} of the causes leave{} {:.2g} times the noise, "
-        "all {} numbers of the model {:.2g} times{}",
-        causes.numbers, causes.numbers == 1 ? "" : "s", causes.numbers == 1 ? "s" : "", causes.held_left,
-        all.numbers, all.held_left, judgement.IsBeaten() ? ": some cause is missing" : ""));
+        "on the held-out quarter the causes leave {:.2g} times the noise, a fit of all {} parameters "
+        "{:.2g} times{}",
+        causes.held_left, all.numbers, all.held_left, judgement.IsBeaten() ? ": some cause is missing" : ""));
 }
 
 }  // namespace
@@ -80,17 +79,15 @@ Answer MakeAnswer(const RecordingJudgement& judgement, const RobotModel& robot,
     answer.word = word, answer.sentence = std::move(sentence);
   };
   if (judgement.Agrees()) {
-    say("EXPLAINED", fmt::format("{} explains {}: the rest is noise{}", model, recording,
-                                 DescribeNoise(judgement, robot)));
+    say("EXPLAINED", fmt::format("{} explains {}. {}", model, recording, DescribeNoise(judgement, robot)));
   } else if (judgement.causes.empty() && judgement.IsWhole() && judgement.IsHidden()) {
-    say("PARTLY EXPLAINED", fmt::format("what {} leaves of {} is noise, which would hide an error of a "
-                                        "fifth of any joint's torque",
+    say("PARTLY EXPLAINED", fmt::format("{} explains {} up to noise, which would hide an error of a fifth of "
+                                        "any joint's torque",
                                         model, recording));
   } else if (judgement.causes.empty() && judgement.IsWhole() && judgement.rests) {
     say("PARTLY EXPLAINED",
-        fmt::format("no joint of {} moves: {} explains its gravity there, and nothing else "
-                    "was tested",
-                    recording, model));
+        fmt::format("no joint of {} moves: {} explains gravity there; nothing else was tested", recording,
+                    model));
   } else if (judgement.causes.empty() && judgement.IsWhole()) {
     std::vector<std::string> judged, hidden;
     for (const JointJudgement& one : judgement.balances)
@@ -101,12 +98,12 @@ Answer MakeAnswer(const RecordingJudgement& judgement, const RobotModel& robot,
       answer.sentence +=
           fmt::format("; noise at {} would hide an error of a fifth of the torque", JoinNames(hidden));
   } else if (are_velocities_alone && judgement.IsWhole()) {
-    say("DIFFERS", fmt::format("the velocities of {} are not its positions' derivatives and are not used; "
+    say("DIFFERS", fmt::format("the velocities of {} are not its positions' derivatives and were not used; "
                                "{} explains its torques",
                                recording, model));
   } else if (count == 0) {
     say("NOT EXPLAINED",
-        fmt::format("{} does not explain {}, and no cause that is known does", model, recording));
+        fmt::format("{} does not explain {}, and neither does any known cause", model, recording));
   } else {
     const std::string share =
         judgement.explained > kLeast ? fmt::format(" by {:.3g} %", 100.0 * judgement.explained) : "";

@@ -396,8 +396,7 @@ TEST_F(InitCommand, ARobotThatCannotPassIsRefused) {
   WriteChanged("swims.xml", ReadFixture("pair.xml"), "<worldbody>",
                "<option density=\"1000\" viscosity=\"0.1\"/><worldbody>");
   const std::string said = Expect(2, "init swims.xml").err;
-  EXPECT_THAT(
-      said, HasSubstr("swims.xml: no motion of it, however small, passes its run: model (medium of density"));
+  EXPECT_THAT(said, HasSubstr("swims.xml: even the smallest motion fails its run: model (medium of density"));
   EXPECT_FALSE(Has("swims"));
 }
 

@@ -222,8 +222,8 @@ TEST(Urdf, TakesPartsThatNoBodyCanBe) {
   const std::string text = ReplaceOnce(
       kHand, point, R"(<mass value="0"/><inertia ixx="1e-6" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>)");
   const RobotDescription hand = ParseUrdf(text, "hand.urdf");
-  EXPECT_THAT(hand.notes, ::testing::Contains(
-                              "inertials that no body can have, counted in what they are welded to: tip"));
+  EXPECT_THAT(hand.notes,
+              ::testing::Contains("impossible inertials, merged into the link that they are welded to: tip"));
   EXPECT_NEAR(hand.spec.joints[1].body.inertia.trace(), 3.1e-5, 1e-18);
 }
 
