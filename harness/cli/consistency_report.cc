@@ -373,11 +373,15 @@ Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& compariso
                       terms, result.terms.size() == 1 ? "s" : "", DescribeDigits(*comparison.digits),
                       DescribeLoosest(comparison.digits->loosest), left_out);
     } else {
-      answer.sentence = fmt::format("{} agree to {} in {}{}.",
-                                    comparison.with_engine  ? "the analytic model and MuJoCo"
-                                    : request.has_results() ? "the description and the results"
-                                                            : "the two descriptions",
-                                    request.DescribeTolerance(), terms, left_out);
+      const bool is_of_model =
+          comparison.first == comparison.second || comparison.first.extension() == ".toml";
+      const std::string both = request.has_results() ? "the description and the results"
+                               : comparison.with_engine && is_of_model
+                                   ? "the analytic model and MuJoCo"
+                                   : fmt::format("{} and {}", comparison.first.filename().string(),
+                                                 comparison.second.filename().string());
+      answer.sentence =
+          fmt::format("{} agree to {} in {}{}.", both, request.DescribeTolerance(), terms, left_out);
     }
   }
   if (!repair.command.empty()) answer.remarks.push_back("repair: " + repair.command);
