@@ -183,8 +183,7 @@ std::vector<Decoration> MakeWay(const RunFrames& run) {
     length += piece;
     from = to;
   }
-  if (length < 1.0) way.clear();
-  return way;
+  return length < 1.0 ? std::vector<Decoration>() : way;
 }
 
 /// The key to their colours.

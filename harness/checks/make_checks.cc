@@ -80,24 +80,22 @@ std::map<std::string_view, const char*> ListDescriptions(const Setup& setup) {
         {"closed_loop_spectral_radius",
          "largest eigenvalue of the sampled errors of base and joints under the scenario's gains"},
         {"law_torque",
-         "torques sent, and forces asked of the ground, against the law computed from the engine's terms, "
-         "relative to the forces that balance"},
+         "torques and demanded ground forces against the law from the engine's terms, relative to all "
+         "forces"},
         {"inverse_dynamics_robot", "the robot's part of that residual, relative to the forces that balance"},
         {"reduced_acceleration", "xi_dot of the robot on rigid feet that do not slip, against the engine's"},
         {"contact_force",
-         "forces of the rigid system's feet against the engine's, relative to them and the weight; 0 where "
-         "they are not determined"},
-        {"solver", "what the engine's solver left over of its own equations of motion"}};
+         "foot forces of the rigid system against the engine's, over them and the weight; 0: not determined"},
+        {"solver", "remainder of the engine's solver in its equations of motion"}};
   }
   if (setup.joints() != nullptr) {
     return {
         {"closed_loop_spectral_radius",
          "largest eigenvalue of the sampled joint errors under the scenario's gains"},
         {"law_torque",
-         "torques sent against the law of the joints computed from the engine's terms, relative to the "
-         "forces that balance"},
+         "torques sent against the law from the engine's terms, relative to the forces that balance"},
         {"inverse_dynamics_robot", "the robot's part of that residual, relative to the forces that balance"},
-        {"solver", "what the engine's solver left over of its own equations of motion"}};
+        {"solver", "remainder of the engine's solver in its equations of motion"}};
   }
   if (!setup.start().bonds.empty())
     return {{"fingertip_slip", "distance of the joined points on fingertip and object"}};

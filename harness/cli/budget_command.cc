@@ -81,8 +81,7 @@ void AddBudgetCommand(CLI::App* app) {
   const auto [command, request] = AddRequest<BudgetRequest>(
       app, "budget", "Show which declared imperfection costs the accuracy: each alone, all but one, all",
       {"dexcheck budget curve-real", "dexcheck budget motion.toml --set duration=2"});
-  AddOption(command, "SCENARIO", &request->scenario, "Name of a shipped scenario, or a TOML file")
-      ->required();
+  AddOption(command, "SCENARIO", &request->scenario, "A shipped scenario, or a TOML file")->required();
   AddOverrideOptions(command, &request->overrides);
   AddSeedOption(command, &request->seed, "Seed of all that is random");
   AddOption(command, "--page FILE.html", &request->page_file, "Write table and bar chart as a page");

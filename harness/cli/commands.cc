@@ -315,10 +315,9 @@ std::vector<std::string> OwnController::List() const {
 }
 
 CLI::Option* AddControllerOptions(CLI::App* command, OwnController* controller) {
-  CLI::Option* const option =
-      AddOption(command, "--controller FILE|COMMAND", &controller->run,
-                "A controller of your own: a shared library (.so), a Python file (.py), or a command that "
-                "speaks the protocol of controller_protocol.h");
+  CLI::Option* const option = AddOption(command, "--controller FILE|COMMAND", &controller->run,
+                                        "Your controller: a library (.so), a Python file (.py), or a command "
+                                        "with the protocol of controller_protocol.h");
   AddOption(command, "--controller-time-limit SECONDS", &controller->time_limit,
             "Time limit for each reply of the controller, s (1 by default); ten times that for its start")
       ->check(PositiveNumber())
@@ -335,7 +334,7 @@ std::array<CLI::Option*, 3> AddOverrideOptions(CLI::App* command, Overrides* ove
                 "Set a key of the scenario, or with model. before it one of the parameter file")
           ->allow_extra_args(false);
   CLI::Option* const unset =
-      AddOption(command, "--unset KEY", &overrides->unset, "Remove such a key, before any is set")
+      AddOption(command, "--unset KEY", &overrides->unset, "Remove a key, before any is set")
           ->check(is_key)
           ->allow_extra_args(false);
   return {set, unset, AddControllerOptions(command, &overrides->controller)};

@@ -134,17 +134,16 @@ void AddCompareCommand(CLI::App* app) {
       {"dexcheck compare run_a run_b --page comparison.html",
        "dexcheck compare run_a run_b --tolerance 1e-9"});
   AddOption(command, "RUN_DIR", &request->run_folders,
-            "Folders of runs, or recordings; the first is what the others are compared with")
+            "Folders of runs, or recordings; all are compared with the first")
       ->required()
       ->type_name("RUN_DIR...");
   AddOption(command, "--tolerance REL", &request->tolerance,
             "Exit with 1 when a signal differs by more than this fraction of its size, or a verdict differs");
   AddOption(command, "--signals A,B,...", &request->options.patterns,
-            "Only these signals; * stands for any text: object/*,tau")
+            "Only these signals, such as object/*,tau")
       ->delimiter(',')
       ->allow_extra_args(false);
-  AddOption(command, "--page FILE.html", &request->page_file,
-            "Write a page with the signals overlaid and subtracted");
+  AddOption(command, "--page FILE.html", &request->page_file, "Write a page with signals and differences");
   CLI::Option* const model =
       AddOption(command, "--model MODEL", &request->model,
                 "Parameter file, URDF or MJCF of the robot of two recordings: what differs is named");

@@ -82,14 +82,14 @@ void AddConsistencyCommand(CLI::App* app) {
   AddJsonOption(command, "the results", &request->json_file);
   AddJUnitOption(command, &request->junit_file);
   AddOption(command, "--page FILE.html", &request->page_file,
-            "Write a page that loads nothing: both robots in one view, what differs, and the causes");
+            "Write a page: both robots in one view, what differs, and the causes");
   AddJudgingOptions(command, request.get());
   AddOption(command, "--ignore WORD,...", &request->ignore,
             "Constants of joints in which the two may differ: armature, damping, friction, coupling to "
             "others, effort; or links to leave out with all that they carry")
       ->delimiter(',');
   AddOption(command, "--only LINK", &request->options.part.only,
-            "Compare this link or joint and what it carries; all else is held");
+            "Compare this link or joint and what it carries only");
   AddOption(command, "--lock JOINT[=VALUE]", &request->lock,
             "Hold a joint at a value (0), rad or m; may be given again")
       ->allow_extra_args(false);

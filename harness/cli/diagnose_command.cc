@@ -136,8 +136,7 @@ void AddDiagnoseCommand(CLI::App* app) {
     return name == "-" ? "must be a file, got -" : std::string();
   };
   AddOption(command, "--write FILE", &request->repaired_file,
-            "Write the first description with its causes corrected to this file, and compare it with the "
-            "second")
+            "Write the first description corrected, and compare it with the second")
       ->check(is_file);
   AddJsonOption(command, "the results", &request->json_file);
   command->add_flag("--quiet", request->quiet, "No progress");

@@ -186,8 +186,7 @@ void AddEngineComparisonCommand(CLI::App* app) {
             "One more: a program of your own that provides terms (harness/descriptions/README.md)")
       ->allow_extra_args(false);
   AddOption(command, "--mjcf FILE.xml", &request->options.mjcf, "What MuJoCo reads instead of ROBOT");
-  AddOption(command, "--node-modules FOLDER", &request->options.node_modules,
-            "Folder where npm installed @mujoco/mujoco");
+  AddOption(command, "--node-modules FOLDER", &request->options.node_modules, "Folder of @mujoco/mujoco");
   command->add_flag("--floating", request->urdf.floating, "The root of a URDF floats");
   AddSampleOptions(command, 1000000, &request->options.states.samples, &request->options.states.seed);
   AddOption(command, "--digits N", &request->digits,

@@ -126,10 +126,8 @@ void AddExciteCommand(CLI::App* app) {
   const auto [command, request] = AddRequest<MotionRequest>(
       app, "excite", "Design a motion to record that shows errors of a robot's model best within its limits",
       {"dexcheck excite arm.urdf --out motion.csv", "dexcheck excite arm.urdf --limits limits.toml"});
-  AddOption(command, "MODEL,--model", &request->model, "The robot: a parameter file, URDF or MJCF")
-      ->required();
-  AddOption(command, "--out FILE.csv", &request->motion_file,
-            "The motion: t, q, qd, qdd and the model's torques");
+  AddOption(command, "MODEL,--model", &request->model, "Parameter file, URDF or MJCF")->required();
+  AddOption(command, "--out FILE.csv", &request->motion_file, "The motion: t, q, qd, qdd, model's torques");
   AddOption(command, "--recording FILE", &request->recorded,
             "An existing recording, which the motion complements")
       ->allow_extra_args(false);

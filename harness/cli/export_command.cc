@@ -199,13 +199,13 @@ void AddExportCommand(CLI::App* app) {
       AddOption(command, "--mcap FILE.mcap", &request->mcap_file,
                 "File of messages for Foxglove or PlotJuggler, a topic for each signal");
   AddOption(command, "--signals A,B,...", &request->patterns,
-            "Only time and these signals; * stands for any text: time,object/*,check/M_bar")
+            "Only time and these signals, such as object/*,check/M_bar")
       ->delimiter(',')
       ->allow_extra_args(false);
   AddOption(command, "--every N", &request->every, "Only the first of every N rows")
       ->check(WholeNumber(1, std::numeric_limits<int>::max()))
       ->capture_default_str();
-  command->add_flag("--list", request->list, "Print the signals, their units and descriptions")
+  command->add_flag("--list", request->list, "List signals, units and descriptions")
       ->excludes(csv)
       ->excludes(mcap);
   AddJsonOption(command, "what --list prints", &request->json_file);

@@ -103,14 +103,10 @@ void AddImportCommand(CLI::App* app) {
   AddOption(command, "--out FILE.toml", &request->out, "File to write (- for standard output)")
       ->capture_default_str();
   AddUrdfOptions(command, &request->urdf);
-  command->add_flag(
-      "--downgrade", request->downgrade,
-      "Write an MJCF instead: a copy of a newer one for MuJoCo 2.2.2, without what has no effect on the "
-      "dynamics");
-  command->add_flag(
-      "--motors", request->motors,
-      "Write an MJCF instead: a copy with a torque motor for each joint, as run needs it, in the "
-      "place of all actuators");
+  command->add_flag("--downgrade", request->downgrade,
+                    "Write an MJCF for MuJoCo 2.2.2, without parts that have no effect on the dynamics");
+  command->add_flag("--motors", request->motors,
+                    "Write an MJCF with a torque motor for each joint, as run needs it");
   AddJsonOption(command, "what was read, and what was left out or changed", &request->json_file);
 }
 

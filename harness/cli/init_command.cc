@@ -235,8 +235,7 @@ void AddInitCommand(CLI::App* app) {
   AddOption(command, "--from SCENARIO", &request->from,
             "Copy a shipped scenario instead, with its robot (dexcheck run --list)")
       ->excludes(robot);
-  AddOption(command, "--out DIR", &request->out,
-            "Folder to make; named after the robot or scenario by default");
+  AddOption(command, "--out DIR", &request->out, "Folder to make; by default named after robot or scenario");
 }
 
 }  // namespace dexcheck::cli

@@ -274,19 +274,14 @@ void AddJudgeCommand(CLI::App* app) {
   AddOption(command, "MODEL", &request->model, "Parameter file, URDF or MJCF")->required();
   AddOption(
       command, "RECORDING", &request->recording,
-      "CSV or text, MCAP, ROS 2 bag, HDF5, NumPy, a run's log, a file of columns that names files, or - "
-      "for standard input");
-  AddOption(command, "--recording FILE", &request->more, "A further recording of the same robot")
-      ->allow_extra_args(false);
-  AddOption(command, "--columns FILE.toml", &request->columns,
-            "Which column is what; --describe writes one to start from");
-  command->add_flag("--describe", request->describe,
-                    "Print how the recording's columns are understood, as a file of columns");
+      "CSV or text, MCAP, ROS 2 bag, HDF5, NumPy, a run's log, a file of columns, - for standard input");
+  AddOption(command, "--recording FILE", &request->more, "One more recording")->allow_extra_args(false);
+  AddOption(command, "--columns FILE.toml", &request->columns, "Meaning of the columns; see --describe");
+  command->add_flag("--describe", request->describe, "Print the columns as understood, for --columns");
   AddOption(command, "--write FILE", &request->corrected, "Write a copy of MODEL with the causes corrected");
   AddUrdfOptions(command, &request->urdf);
   AddJsonOption(command, "the judgement", &request->json_file);
-  AddOption(command, "--page FILE.html", &request->page_file,
-            "Write a page that loads nothing: torques, residuals, causes");
+  AddOption(command, "--page FILE.html", &request->page_file, "Write a page: torques, residuals, causes");
   command->add_flag("--quiet", request->quiet, "No progress, and causes and verdict only");
 }
 

@@ -241,14 +241,12 @@ void AddMutateCommand(CLI::App* app) {
             "found, run to the end)")
       ->check(NumberFrom(1e-3, 1e4));
   AddOption(command, "--numbers N", &request->run.parameters,
-            "In a run: how many parameters of the model are changed, evenly spread over all")
+            "In a run: number of changed parameters, spread over all")
       ->check(WholeNumber(0, 100000))
       ->capture_default_str();
-  CLI::Option* const draws =
-      AddOption(
-          command, "--draws N", &request->run.draws,
-          "In a run: number of random sets of faults (place, size, time), instead of the systematic ones")
-          ->check(WholeNumber(1, 100000));
+  CLI::Option* const draws = AddOption(command, "--draws N", &request->run.draws,
+                                       "In a run: sets of random faults, instead of the systematic ones")
+                                 ->check(WholeNumber(1, 100000));
   AddOption(command, "--together N", &request->run.together, "With --draws: faults at once")
       ->check(WholeNumber(1, 5))
       ->needs(draws)
@@ -256,15 +254,14 @@ void AddMutateCommand(CLI::App* app) {
   AddOption(command, "--draw-seed N", &request->run.seed, "In a run: seed of the random sets")
       ->check(WholeNumber(0, 1000000))
       ->capture_default_str();
-  AddOption(command, "--kinds KIND,...", &request->run.kinds,
-            "In a run: kinds of the random faults: motor, sensor, joint, body, floor, wheels, contact, "
-            "solver, law (default: all)")
+  AddOption(
+      command, "--kinds KIND,...", &request->run.kinds,
+      "In a run: kinds of random faults: motor, sensor, joint, body, floor, wheels, contact, solver, law")
       ->delimiter(',');
   AddSampleOptions(command, 1000, &request->options.samples, &request->options.seed);
-  command->add_flag("--no-diagnosis", request->no_diagnosis,
-                    "Count which faults are found, without naming causes");
+  command->add_flag("--no-diagnosis", request->no_diagnosis, "Count found faults, without naming causes");
   AddOption(command, "--page FILE.html", &request->page_file,
-            "In a run: an HTML page of the injected, found and named faults");
+            "In a run: a page of injected and found faults");
   AddJobsOption(command, "Faults", &request->jobs);
   AddJsonOption(command, "the results, from which an interrupted campaign goes on,", &request->json_file);
   command->add_flag("--quiet", request->quiet, "Print the verdict only");

@@ -138,8 +138,7 @@ void AddRenderCommand(CLI::App* app) {
       app, "render", "Draw a recorded run as a video, or one instant of it",
       {"dexcheck render my_run --camera follow", "dexcheck render my_run --still 2.5 --out still.png"});
   AddOption(command, "RUN_DIR", &request->run_folder, "Folder of the run")->required()->type_name("");
-  AddOption(command, "--out FILE", &request->out,
-            "A video .mp4, or a picture .png (default: video.mp4 or still.png in RUN_DIR)");
+  AddOption(command, "--out FILE", &request->out, "Video .mp4 or picture .png (in RUN_DIR by default)");
   AddOption(command, "--still T", &request->still, "One picture at this time of the run, s");
   AddOption(command, "--camera NAME", &request->video.camera,
             "overview (the default), follow, grasp, top, or another of the MJCF's; robot, object: close-ups; "

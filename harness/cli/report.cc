@@ -286,8 +286,7 @@ ExitCode ReportOutput::Write(const Report& report, bool is_printed) {
   if (is_printed) {
     if (!report.answer.word.empty()) PrintAnswer(report.answer);
     if (!quiet_) fmt::print("{}", report.details);
-    fmt::print("{}", report.last);
-    fmt::print("{}", page);
+    fmt::print("{}{}", report.last, page);
   }
   if (report.code == kDisagreement || report.failure.empty()) return report.code;
   return ReportFailure(report.failure);

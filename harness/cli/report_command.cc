@@ -51,9 +51,8 @@ void AddReportCommand(CLI::App* app) {
   command->add_flag("--no-replay", request->no_replay, "Leave out the replay in three dimensions");
   command->add_flag("--quiet", request->quiet, "Print nothing");
   AddJsonOption(command, "where page and figures are", &request->json_file);
-  AddOption(
-      command, "--tex FILE.tex", &request->tex_file,
-      "Write a table of results for LaTeX, too, with the commit and the command (- for standard output)");
+  AddOption(command, "--tex FILE.tex", &request->tex_file,
+            "Also write a LaTeX table of results, commit and command (- for standard output)");
 }
 
 }  // namespace dexcheck::cli

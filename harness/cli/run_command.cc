@@ -259,9 +259,9 @@ void AddRunCommand(CLI::App* app, const std::string& command_line) {
   CLI::Option* const junit = AddJUnitOption(command, &request->junit_file);
   CLI::Option* const no_log = command->add_flag("--no-log", request->no_log, "Write no files");
   CLI::Option* const quiet = command->add_flag("--quiet", request->quiet, "Print the verdict only");
-  CLI::Option* const gains = command->add_flag(
-      "--gains", request->gains,
-      "Print a joint motion's gains, its stability margins and the fastest gains with enough of them");
+  CLI::Option* const gains =
+      command->add_flag("--gains", request->gains,
+                        "Print a joint motion's gains, stability margins, and its fastest safe gains");
   CLI::Option* const all =
       command->add_flag("--all", request->all, "Print each check, not only a line for each category");
   CLI::Option* const json = AddJsonOption(command, "the summary", &request->json_file);

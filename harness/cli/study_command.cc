@@ -311,8 +311,7 @@ void AddReadCommands(CLI::App* study, const std::shared_ptr<StudyRequest>& reque
   CLI::App* const report =
       add("report", "Write an HTML page of a study's results",
           {"dexcheck study report gains.sqlite", "dexcheck study report gains.sqlite --page gains.html"});
-  AddOption(report, "--page FILE.html", &request->out,
-            "The page (DB.html by default); - for standard output");
+  AddOption(report, "--page FILE.html", &request->out, "The page (default: DB.html); - for standard output");
   AddJsonOption(report, "the same data", &request->json_file);
   SetAction(report, [=] { return WriteReport(*request); });
 
@@ -347,9 +346,7 @@ void AddStudyCommand(CLI::App* app) {
                                    {"dexcheck study run gains --db gains.sqlite",
                                     "dexcheck study run my_study.toml --db part.sqlite --shard 1/4"});
   AddOption(run, "STUDY", &request->study, "Name of a shipped study, or a TOML file")->required();
-  AddOption(run, "--db FILE.sqlite", &request->database,
-            "The study's database (SQLite), made when there is none")
-      ->required();
+  AddOption(run, "--db FILE.sqlite", &request->database, "Database (SQLite), made if missing")->required();
   AddControllerOptions(run, &request->controller);
   AddJobsOption(run, "Trials", &request->jobs);
   AddOption(run, "--shard I/N", &request->shard, "Only the I-th of N parts of the study");
@@ -373,12 +370,9 @@ void AddStudyCommand(CLI::App* app) {
   AddOption(slurm, "STUDY", &request->study, "Name of a shipped study, or a TOML file")->required();
   const auto job = std::make_shared<SlurmJob>();
   AddControllerOptions(slurm, &request->controller);
-  AddOption(slurm, "--tasks N", &job->tasks, "Parts of the study, each with a database of its own")
-      ->required()
-      ->check(whole);
+  AddOption(slurm, "--tasks N", &job->tasks, "Parts, each with its own database")->required()->check(whole);
   AddOption(slurm, "--array-size N", &job->array_size,
-            "Most elements of the array (1000, as Slurm's MaxArraySize of 1001 allows); of more parts "
-            "each makes several")
+            "Largest number of elements (1000, Slurm's default); each may make several parts")
       ->check(whole);
   AddOption(slurm, "--cpus N", &job->cpus, "Processors of an element (1)")->check(whole);
   AddOption(slurm, "--throttle N", &job->throttle, "Elements that run at a time")->check(whole);
