@@ -59,7 +59,7 @@ colours() { script -qec "$*" /dev/null | grep -c $'\033\[[0-9;]*m' || true; }
 # Passing checks: a line for each question; --all lists them; what fails is always listed.
 "${run[@]}" >folded.txt
 "${run[@]}" --all >all.txt
-for question in model law inverse_dynamics forward_dynamics assumption; do
+for question in model law inverse forward assumption; do
   [[ $(grep -cE "^$question +([0-9]+ +)?[a-z_]" folded.txt) -ge 1 ]] || fail "no line for $question: $(cat folded.txt)"
 done
 [[ $(grep -cE ' ok$' folded.txt) -eq 6 ]] || fail "passing checks are not folded: $(cat folded.txt)"
