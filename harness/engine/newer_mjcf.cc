@@ -334,7 +334,7 @@ void StateNewDefaults(MjcfFile* mjcf) {
   }
   XMLElement* const compiler = RequireSection(mjcf->root(), "compiler");
   compiler->SetAttribute("autolimits", "true");
-  mjcf->Note(*compiler, "<compiler autolimits>", "set to true, as MuJoCo 3 does");
+  mjcf->Note(*compiler, "<compiler autolimits>", "set to true, default since MuJoCo 3");
 }
 
 }  // namespace dexcheck
