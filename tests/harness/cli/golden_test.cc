@@ -32,7 +32,7 @@ std::string HideNumbers(std::string text) {
   static const std::regex numbers(
       R"([-+]?\b\d+(\.\d+(e[-+]?\d+)?|e[-+]?\d+)|\b\d+(?=(\s+[\d#]\S*)?\s+(s|min|h|us|ms|times|x real)\b))");
   static const std::regex parts(R"(\b(plant|controller|checks|log) \d+)");  // us a step
-  static const std::regex ratios(R"((\bu?s\s+x) \d+)");                                // of times
+  static const std::regex ratios(R"((\bu?s\s+x) \d+)");                     // of times
   text = std::regex_replace(std::regex_replace(text, numbers, "#"), parts, "$1 #");
   return std::regex_replace(text, ratios, "$1 #");
 }
