@@ -130,8 +130,10 @@ TEST_F(Digits, APlacementIsToldAsItsFileHasIt) {
   const std::string right = MakeFinger(R"(ixx="0.000123" iyy="0.000234" izz="0.000245" ixy="0")");
   Write("right.urdf", right);
   const std::pair<Edit, std::string> cases[] = {
-      {{"xyz=\"0 0.02 0.1\"", "xyz=\"0 0.02 0.13\""}, "position differs: z 0.13 m here, 0.1 m in the other file"},
-      {{"rpy=\"0.3 0 0\"", "rpy=\"0.5 0 0\""}, "rotation differs: roll 0.5 rad here, 0.3 rad in the other file"},
+      {{"xyz=\"0 0.02 0.1\"", "xyz=\"0 0.02 0.13\""},
+       "position differs: z 0.13 m here, 0.1 m in the other file"},
+      {{"rpy=\"0.3 0 0\"", "rpy=\"0.5 0 0\""},
+       "rotation differs: roll 0.5 rad here, 0.3 rad in the other file"},
       {{"axis xyz=\"0 1 0\"", "axis xyz=\"0 -1 0\""}, "axis with the other sign"}};
   for (const auto& [edit, words] : cases) {
     Write("wrong.urdf", ApplyEdits(right, {edit}));

@@ -190,8 +190,7 @@ TEST(FloatingBase, TheRobotIsTheTreeWithTheMostJoints) {
     const Comparison comparison = CompareFiles(a, b, {}, options);
     EXPECT_TRUE(comparison.result.Agrees()) << ::testing::PrintToString(ListDifferences(comparison));
     const bool is_said =
-        std::ranges::find(comparison.not_compared,
-                          "not connected to the robot: joints b, s") !=
+        std::ranges::find(comparison.not_compared, "not connected to the robot: joints b, s") !=
         comparison.not_compared.end();
     EXPECT_EQ(is_said, b == scene);
   }
