@@ -242,7 +242,7 @@ void AddTables(const ConsistencyRequest& request, const Comparison& comparison, 
     report->details += "\n";
   };
   list("not compared", comparison.not_compared);
-  list("differs, does not act on these terms", comparison.without_effect);
+  list("differs without effect on these terms", comparison.without_effect);
   list("worth knowing", comparison.notes);
   std::vector<TableRow> rows;
   const std::vector<CheckRecord>& constants = result.constants.records;
@@ -357,7 +357,9 @@ Answer MakeAnswer(const ConsistencyRequest& request, const Comparison& compariso
     return notes.empty() ? "" : fmt::format("; {} {} ({})", notes.size(), what, Abbreviate(names));
   };
   const std::string left_out = count(comparison.not_compared, "not compared") +
-                               count(comparison.without_effect, "differ, do not act on these terms");
+                               count(comparison.without_effect, comparison.without_effect.size() == 1
+                                                                    ? "differs without effect on these terms"
+                                                                    : "differ without effect on these terms");
   Answer answer{.word = "AGREE"};
   if (comparison.causes && !comparison.causes->agrees) {
     answer = AnswerByCauses(request, comparison, repair.left);
