@@ -125,6 +125,7 @@ void AddLimits(const Json& limited, Report* report) {
   std::ranges::stable_sort(longest, std::ranges::greater(),
                            [](const Json& one) { return one["time_s"].get<double>(); });
   std::vector<std::string> texts;
+  texts.reserve(longest.size());
   for (const Json& one : longest)
     texts.push_back(fmt::format("{} for {:.3f} s from {:.3f} s, by up to {:.3g}", FindText(one, "/motor"),
                                 one["time_s"].get<double>(), one["first_s"].get<double>(),
