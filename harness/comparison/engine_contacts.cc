@@ -276,7 +276,6 @@ struct RunElements {
   const char* words;
   mjtObj type;
   bool lists_missing;  ///< Whether an element that one of two models lacks is a difference.
-  int (*count)(const mjModel& model);
   /// The numbers of one element; empty where they have no effect.
   std::string (*show)(const mjModel& model, int index);
 };
@@ -291,34 +290,31 @@ std::string ShowSoftness(const mjtNum* solref, const mjtNum* solimp, int index) 
 }
 
 const RunElements kRunElements[] = {
-    {"softness of limits", mjOBJ_JOINT, false, [](const mjModel& m) { return static_cast<int>(m.njnt); },
+    {"softness of limits", mjOBJ_JOINT, false,
      [](const mjModel& m, int i) {
        return m.jnt_limited[i] == 0 ? "" : ShowSoftness(m.jnt_solref, m.jnt_solimp, i);
      }},
     {"softness of dry friction", mjOBJ_JOINT, false,
-     [](const mjModel& m) { return static_cast<int>(m.njnt); },
      [](const mjModel& m, int i) {
        const int dof = m.jnt_dofadr[i];
        return m.dof_frictionloss[dof] == 0.0 ? "" : ShowSoftness(m.dof_solref, m.dof_solimp, dof);
      }},
-    {"softness of tendons", mjOBJ_TENDON, false, [](const mjModel& m) { return static_cast<int>(m.ntendon); },
+    {"softness of tendons", mjOBJ_TENDON, false,
      [](const mjModel& m, int i) {
        return (m.tendon_limited[i] == 0 ? "" : ShowSoftness(m.tendon_solref_lim, m.tendon_solimp_lim, i)) +
               (m.tendon_frictionloss[i] == 0.0 ? ""
                                                : ShowSoftness(m.tendon_solref_fri, m.tendon_solimp_fri, i));
      }},
     {"softness of equalities", mjOBJ_EQUALITY, false,
-     [](const mjModel& m) { return static_cast<int>(m.neq); },
      [](const mjModel& m, int i) { return ShowSoftness(m.eq_solref, m.eq_solimp, i); }},
-    {"sensors", mjOBJ_SENSOR, true, [](const mjModel& m) { return static_cast<int>(m.nsensor); },
+    {"sensors", mjOBJ_SENSOR, true,
      [](const mjModel& m, int i) {
        const auto object = static_cast<mjtObj>(m.sensor_objtype[i]);
        return fmt::format("{} {} {} {} {}", m.sensor_type[i],
                           object == mjOBJ_UNKNOWN ? "" : NameOf(m, object, m.sensor_objid[i]),
                           m.sensor_dim[i], m.sensor_cutoff[i], m.sensor_noise[i]);
      }},
-    {"keyframes", mjOBJ_KEY, true, [](const mjModel& m) { return static_cast<int>(m.nkey); },
-     [](const mjModel& m, int i) {
+    {"keyframes", mjOBJ_KEY, true, [](const mjModel& m, int i) {
        return ShowShort(m.key_qpos + m.nq * i, static_cast<int>(m.nq)) +
               ShowShort(m.key_qvel + m.nv * i, static_cast<int>(m.nv)) +
               ShowShort(m.key_ctrl + m.nu * i, static_cast<int>(m.nu));
@@ -326,7 +322,8 @@ const RunElements kRunElements[] = {
 
 std::map<std::string, std::string> ListRunElements(const RunElements& kind, const mjModel& model) {
   std::map<std::string, std::string> texts;
-  for (int i = 0; i < kind.count(model); ++i) texts[NameOf(model, kind.type, i)] = kind.show(model, i);
+  for (int i = 0; i < CountElements(model, kind.type); ++i)
+    texts[NameOf(model, kind.type, i)] = kind.show(model, i);
   return texts;
 }
 

@@ -307,10 +307,10 @@ std::string NameOf(const mjModel& model, mjtObj type, int id) {
 }
 
 int CountElements(const mjModel& model, mjtObj type) {
-  const std::pair<mjtObj, EngineSize> counts[] = {{mjOBJ_BODY, model.nbody},   {mjOBJ_JOINT, model.njnt},
-                                                  {mjOBJ_DOF, model.nv},       {mjOBJ_SITE, model.nsite},
-                                                  {mjOBJ_EQUALITY, model.neq}, {mjOBJ_TENDON, model.ntendon},
-                                                  {mjOBJ_ACTUATOR, model.nu}};
+  const std::pair<mjtObj, EngineSize> counts[] = {
+      {mjOBJ_BODY, model.nbody},  {mjOBJ_JOINT, model.njnt},     {mjOBJ_DOF, model.nv},
+      {mjOBJ_SITE, model.nsite},  {mjOBJ_EQUALITY, model.neq},   {mjOBJ_TENDON, model.ntendon},
+      {mjOBJ_ACTUATOR, model.nu}, {mjOBJ_SENSOR, model.nsensor}, {mjOBJ_KEY, model.nkey}};
   for (const auto& [kind, count] : counts)
     if (kind == type) return static_cast<int>(count);
   return 0;

@@ -122,10 +122,13 @@ void EngineTerms::ListChains(std::span<const int> frames) {
 
 void EngineTerms::SetState(const Eigen::Ref<const VectorXd>& q, const Eigen::Ref<const VectorXd>& velocity,
                            const Pose& X_Bo, const Vector6d& V_Bo, const EvaluatedPositions& evaluated) {
+  // Forces of tendons and fluids need more than places of bodies.
+  const bool takes = engine_->ngeom == 0 && engine_->ntendon == 0;
+  const EvaluatedPositions taken = takes ? evaluated : EvaluatedPositions{};
   q_ = q;
-  SetPositions(q, X_Bo, evaluated);
+  SetPositions(q, X_Bo, taken);
   SetVelocities(q, velocity, V_Bo);
-  CalcMass(evaluated.data == nullptr ? *data_ : *evaluated.data);
+  CalcMass(taken.data == nullptr ? *data_ : *taken.data);
   CalcForces();
   CalcBodyAccelerations();
   CalcEnergyAndMomentum();
@@ -138,8 +141,7 @@ void EngineTerms::SetPositions(const Eigen::Ref<const VectorXd>& q, const Pose& 
   adapter_->SetPositions(q, d->qpos);
   if (has_object_) WriteFreePose(X_Bo, d->qpos + adapter_->object_qpos());
   tilt_.setIdentity();
-  // Forces of tendons and fluids need more than places of bodies.
-  if (evaluated.data != nullptr && m->ngeom == 0 && m->ntendon == 0) {
+  if (evaluated.data != nullptr) {
     tilt_ = evaluated.X_W0 * BasePose().inverse(Eigen::Isometry);
     return TakePositions(*evaluated.data);
   }

@@ -6,12 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <limits>
 #include <set>
 
 #include "harness/plant/engine_simulation.h"
 #include "harness/plant/observer.h"
+#include "tests/common/files.h"
 #include "tests/common/paths.h"
 #include "tests/harness/checks/step_check_scene.h"
 
@@ -68,9 +70,11 @@ TEST_P(StepModelCheckTest, ShippedRobotAgreesAlongAWalk) {
 INSTANTIATE_TEST_SUITE_P(Orientation, StepModelCheckTest,
                          ::testing::Values(OrientationFeedback::kAngles, OrientationFeedback::kRotation));
 
-TEST(StepModelCheck, AgreesWithWhatTheControllerEvaluatesInThePlant) {
+/// Compares what the controller evaluates in a plant that tilts and sinks, with an upright robot's positions
+/// and with the plant's own. @param is_taken whether the latter are used.
+void ExpectAgreementInThePlant(const std::filesystem::path& scene, bool is_taken) {
   const RobotModel model = ReadPaperRobot();
-  const MjModelPtr engine = LoadMjcf(SourcePath("/mjcf/scene.xml"));
+  const MjModelPtr engine = LoadMjcf(scene);
   const Adapter adapter(model, *engine, "scene.xml");
   const Torus torus(kRingRadius, kTubeRadius);
   const std::span<const int> fingertips = std::span(model.fingertips()).first(4);
@@ -82,7 +86,6 @@ TEST(StepModelCheck, AgreesWithWhatTheControllerEvaluatesInThePlant) {
   Observer observer(adapter, fingertips, torus);
   GraspController controller(model, fingertips, model.object()->body, torus, GraspControllerOptions(model));
   StepModelCheck check(adapter, fingertips, controller.options().orientation);
-  // With the plant's own positions, tilted and sunk, instead of those of an upright robot.
   StepModelCheck of_plant(adapter, fingertips, controller.options().orientation);
   PlantReading reading;
   double tilt = 0.0;
@@ -101,7 +104,7 @@ TEST(StepModelCheck, AgreesWithWhatTheControllerEvaluatesInThePlant) {
   }
   EXPECT_GT(tilt, 0.5 * kTilt);
   EXPECT_GT(speed, 0.1);
-  EXPECT_GT(of_plant.engine().terms().tilt().translation().norm(), 0.0);
+  EXPECT_EQ(of_plant.engine().terms().tilt().translation().norm() > 0.0, is_taken);
   for (const StepModelCheck* one : {&check, &of_plant}) {
     for (const CheckRecord& record : one->records()) {
       EXPECT_FALSE(record.failed) << record.name << ": " << record.worst << " > " << record.bound;
@@ -109,6 +112,22 @@ TEST(StepModelCheck, AgreesWithWhatTheControllerEvaluatesInThePlant) {
       EXPECT_GE(record.comparisons, kSteps) << record.name;
     }
   }
+}
+
+TEST(StepModelCheck, AgreesWithWhatTheControllerEvaluatesInThePlant) {
+  ExpectAgreementInThePlant(SourcePath("/mjcf/scene.xml"), /*is_taken=*/true);
+}
+
+// The forces of a tendon need more than places of bodies: all positions are evaluated once more.
+TEST(StepModelCheck, AgreesInAPlantWithATendon) {
+  const TempFolder folder;
+  std::filesystem::copy(SourcePath("/mjcf"), folder.path(), std::filesystem::copy_options::recursive);
+  const std::filesystem::path scene = folder.path() / "scene.xml";
+  WriteText(scene,
+            ReplaceFirst(
+                ReadText(scene), "</mujoco>",
+                "<tendon><fixed name='cable'><joint joint='waist_yaw' coef='1'/></fixed></tendon></mujoco>"));
+  ExpectAgreementInThePlant(scene, /*is_taken=*/false);
 }
 
 /// A change of the model, and what must come of it.

@@ -102,7 +102,7 @@ TEST(JudgeCrane, TheVerdictSaysHowLargeAnErrorNoiseHides) {
     EXPECT_GT(one.hidden, 0.0);
     EXPECT_LT(one.hidden, 0.1 * one.modelled);
   }
-  EXPECT_THAT(tell(quiet).sentence, HasSubstr("% of its torque)"));
+  EXPECT_THAT(tell(quiet).sentence, AllOf(HasSubstr("hides errors below"), HasSubstr("% of its torque)")));
   // Beside a noise of 1 kN m nothing can be seen at any joint.
   EXPECT_TRUE(loud.IsWhole() && loud.IsHidden() && !loud.Agrees()) << Tell(loud);
   EXPECT_EQ(tell(loud).word, "PARTLY EXPLAINED");
